@@ -49,11 +49,17 @@ pub(super) fn axis_deviations(vote: &LineVote, refinement: Refinement<'_>) -> [f
 
 /// Standard deviation in radians of an axis, by frames found without one group each, of which there are two or more.
 fn axis_deviation(frames: &[Matrix3<f64>], axis: usize) -> f64 {
+    let few = 1.0 + FEW_GROUPS / (frames.len() as f64 - 1.0);
+    few * axis_covariance(frames, axis).trace().sqrt()
+}
+
+/// Covariance of an axis, rad^2, by frames found without one group each, of which there are two or more; too small of few groups, as Student's t knows.
+pub(super) fn axis_covariance(frames: &[Matrix3<f64>], axis: usize) -> Matrix3<f64> {
     let groups = frames.len() as f64;
     let mean: Vector3<f64> = frames.iter().map(|frame| frame.column(axis).into_owned()).sum::<Vector3<f64>>() / groups;
-    let spread: f64 = frames.iter().map(|frame| (frame.column(axis) - mean).norm_squared()).sum();
-    let few = 1.0 + FEW_GROUPS / (groups - 1.0);
-    few * (spread * (groups - 1.0) / groups).sqrt()
+    let from_mean = |frame: &Matrix3<f64>| frame.column(axis) - mean;
+    let spread: Matrix3<f64> = frames.iter().map(|frame| from_mean(frame) * from_mean(frame).transpose()).sum();
+    spread * ((groups - 1.0) / groups)
 }
 
 /// The frames that come out of a refined one when the segments of one group of photographs at a time are not asked: at most [`MAX_GROUPS`]

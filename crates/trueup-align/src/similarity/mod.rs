@@ -25,7 +25,6 @@ mod printed;
 mod prior;
 mod scale;
 mod signed_permutation;
-mod slope;
 mod turn_equations;
 mod turns;
 mod upright;
@@ -33,6 +32,7 @@ mod vertical;
 mod vertical_vote;
 mod vpg;
 mod weighted_solve;
+mod witnesses;
 
 #[cfg(test)]
 mod equation_tests;
@@ -67,7 +67,7 @@ pub use level::{LevelEvidence, LevelSource};
 pub use options::{BetaMode, Fallback, GateMode, PriorMethod, SimilarityOptions};
 pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
 pub use printed::PrintedEquations;
-pub use prior::{Guidance, SimilarityPrior};
+pub use prior::{Guidance, SimilarityPrior, VerticalSpread};
 
 /// What a user can do when lines do not guide the panorama.
 const REFUSED_HINT: &str =
@@ -119,6 +119,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     });
     let level_from_world = straightening::level_from_world(&upright.down, &rotations);
     guidance.dominant = guidance.dominant.map(|world| rows_of(&(level_from_world * matrix_from_rows(&world))));
+    guidance.spread = guidance.spread.map(|spread| spread.turned(&level_from_world));
     Ok(SimilarityPrior {
         theta: upright.theta.iter().map(|theta| wrap_angle(theta + input.turn)).collect(),
         scale: match input.method {

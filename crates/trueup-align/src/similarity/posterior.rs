@@ -8,7 +8,9 @@
 //!   frames of a facade's windows are as plumb as the facade. Sectors of the scene, not segments,
 //!   are what is left out in the jackknife that tells how far the vertical depends on chance. Where one thing fills several
 //!   sectors, leaving out one of them shows nothing; leaving out a photograph may: the jackknife over these is asked as well,
-//!   and the larger of both counts.
+//!   and the largest counts.
+//! * Upright and level lines may tell of different verticals, each of them sure of its own, as where pavements drain. What is open
+//!   between them (see `witnesses`) is asked as well.
 //! * Plumb lines are not plumb, level ones not level, lenses and focal lengths a little different from what was found,
 //!   alike in all sectors: no comparison of sectors shows that.
 //! * The turns of single cameras have what segments and overlaps leave open of them.
@@ -23,7 +25,7 @@ use trueup_core::source::WorkingFrame;
 use super::camera_correction::{corrected_rotations, relative_certainties, turn_covariances};
 use super::jackknife::{MIN_SECTORS, without_each_sector, without_some_photographs};
 use super::joint::{AxisWeights, LineVote, Refinement};
-use super::prior::SimilarityPrior;
+use super::prior::{SimilarityPrior, VerticalSpread};
 use super::vertical::roll_of;
 use super::vpg::axis_weights;
 use crate::vanishing::{InterpretationPlanes, VERTICAL_LINE_DEG};
@@ -33,7 +35,7 @@ const MIN_GROUPS: usize = 3;
 /// Standard deviation, about any level axis, of what all lines of a scene err by alike, degrees. Fitted on 100 photographs of rendered rooms, whose level
 /// is exact (which need none), and 267 cut from panoramas: the smallest hundredth with which the 95 % interval holds the truth of 95 % of either.
 /// docs/quality.md has the coverage on others.
-const SCENE_DEVIATION_DEG: f64 = 0.02;
+pub(super) const SCENE_DEVIATION_DEG: f64 = 0.02;
 /// Fewest photographs that must show vertical lines, three each: a single one has nothing to agree with.
 const MIN_PHOTOGRAPHS: usize = 2;
 /// Where no prior was believed, the vertical is sought so near to where the cameras expect it, degrees.
@@ -93,7 +95,8 @@ pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRol
     };
     let by_sectors = scatter(without_each_sector(&vote, refinement, *vertical), MIN_SECTORS)?;
     let by_photographs = scatter(without_some_photographs(&vote, refinement), MIN_GROUPS);
-    let scatters: Vec<Scatter> = std::iter::once(by_sectors).chain(by_photographs).collect();
+    let by_kinds = scene.spread.as_ref().map(Scatter::of_spread).filter(|scatter| scatter.groups >= MIN_GROUPS);
+    let scatters: Vec<Scatter> = std::iter::once(by_sectors).chain(by_photographs).chain(by_kinds).collect();
     let certainties = relative_certainties(&scene.cameras(input), input.edges);
     let turns = turn_covariances(&scene.rotations, &certainties, &vote, frame, axis_weights)?;
     let estimate = |(rotation, turn): (&Matrix3<f64>, &Matrix3<f64>)| {
@@ -114,6 +117,8 @@ struct UprightScene {
     /// How many of them segments know: all, or the first alone.
     axes_used: usize,
     axis_weights: AxisWeights,
+    /// What upright and level lines say apart.
+    spread: Option<VerticalSpread>,
 }
 
 impl UprightScene {
@@ -125,14 +130,21 @@ impl UprightScene {
         let corrected = prior.camera_from_world.iter().map(|rows| matrix_from_rows(rows) * world_from_level).collect();
         let (first, second) = orthonormal_complement(&Vector3::y());
         let level = Matrix3::from_columns(&[Vector3::y(), first, second]);
-        let alone =
-            Self { rotations: corrected, frame: level, vertical: 0, axes_used: 1, axis_weights: [1.0, 0.0, 0.0] };
+        let alone = Self {
+            rotations: corrected,
+            frame: level,
+            vertical: 0,
+            axes_used: 1,
+            axis_weights: [1.0, 0.0, 0.0],
+            spread: None,
+        };
         match (&prior.guidance.dominant, prior.guidance.used) {
             (Some(rows), true) => {
                 let frame = matrix_from_rows(rows);
                 let axis_weights = axis_weights(&frame, &Vector3::y(), &prior.guidance);
                 let vertical = frame.row(1).transpose().iamax();
-                Some(Self { frame, vertical, axes_used: 3, axis_weights, ..alone })
+                let spread = prior.guidance.spread;
+                Some(Self { frame, vertical, axes_used: 3, axis_weights, spread, ..alone })
             }
             (None, true) => Some(alone),
             (_, false) => alone.by_lines(input),
@@ -186,6 +198,11 @@ impl Scatter {
         let mean = downs.iter().sum::<Vector3<f64>>() / count;
         let spread: Matrix3<f64> = downs.iter().map(|down| (down - mean) * (down - mean).transpose()).sum();
         (groups > 0).then_some(Self { covariance: spread * ((count - 1.0) / count), groups })
+    }
+
+    /// That of a spread.
+    fn of_spread(spread: &VerticalSpread) -> Self {
+        Self { covariance: matrix_from_rows(&spread.covariance), groups: spread.groups }
     }
 
     /// The roll of a camera, which `rotation` takes the world to, and whose own turn has the covariance `turn`.

@@ -1,11 +1,12 @@
 //! The similarity prior and how it came to be.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
-use trueup_core::geometry::matrix_from_rows;
+use trueup_core::geometry::{matrix_from_rows, rows_of};
 
 use super::level::LevelEvidence;
+use super::witnesses::Reconciled;
 
 /// How the vanishing directions took part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -48,8 +49,33 @@ pub struct Guidance {
     /// Angle in radians between the vertical of the upright lines and the one that level lines imply, where these lie along a slope
     /// and do not take part; `None` otherwise.
     pub slope: Option<f64>,
+    /// How far the vertical may be off by what upright and level lines say apart; `None` where these were not asked.
+    pub spread: Option<VerticalSpread>,
     /// What told of the vertical, and of how much; empty for priors that ask nothing but the overlaps.
     pub level: Vec<LevelEvidence>,
+}
+
+/// How far a vertical may be off.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct VerticalSpread {
+    /// Rows of the mean outer product of its error, rad^2, in the level world.
+    pub covariance: [[f64; 3]; 3],
+    /// How many sectors of the scene, or photographs, it comes from.
+    pub groups: usize,
+}
+
+impl VerticalSpread {
+    /// About `down` of what was `reconciled`, both in the common frame.
+    pub(super) fn about(down: &Vector3<f64>, reconciled: &Reconciled) -> Self {
+        let off = reconciled.vertical * reconciled.vertical.dot(down).signum() - down;
+        let covariance = rows_of(&(reconciled.covariance + off * off.transpose()));
+        Self { covariance, groups: reconciled.groups }
+    }
+
+    /// The same in a world that the rotation `to` takes the common frame to.
+    pub(super) fn turned(&self, to: &Matrix3<f64>) -> Self {
+        Self { covariance: rows_of(&(to * matrix_from_rows(&self.covariance) * to.transpose())), ..*self }
+    }
 }
 
 impl Guidance {
@@ -73,6 +99,7 @@ impl Guidance {
             vertical_rivalry: None,
             vertical_share: None,
             slope: None,
+            spread: None,
             level,
         }
     }
