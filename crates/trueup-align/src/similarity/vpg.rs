@@ -101,18 +101,9 @@ pub(super) fn guide(
     };
     let mut down = level.down;
     if let Some(dominant) = accepted {
-        let before = guidance.clone();
         match scene.solve_dominant(dominant, &mut guidance) {
             Ok(upright) => return Ok(Guided { guidance, upright: Some(upright), level: down }),
             Err(level) => down = level,
-        }
-        // Where the directions that photographs agree on leave the vertical open, those of all segments together may not.
-        let mut again = before;
-        let other = pooled.filter(|_| !again.pooled && options.gate != GateMode::Paper);
-        if let Some(dominant) = other.and_then(|pooled| scene.pooled(&pooled, &mut again))
-            && let Ok(upright) = scene.solve_dominant(dominant, &mut again)
-        {
-            return Ok(Guided { guidance: again, upright: Some(upright), level: down });
         }
     }
     let upright = scene.vertical_alone(&mut guidance);
