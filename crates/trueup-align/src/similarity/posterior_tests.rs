@@ -66,3 +66,20 @@ fn one_photograph_with_lines_tells_nothing() {
     }
     assert_eq!(rolls(&scene, PriorMethod::Straightening), None);
 }
+
+/// Two photographs cannot tell a slope, which tilts them by about a degree; what they state holds it all the same.
+#[test]
+fn what_a_slope_may_tilt_a_pair_by_is_stated() {
+    let world = World::Manhattan { noise_deg: 0.5, bad_share: 0.0 };
+    let level = with_lines(SyntheticScene::new(Sweep { count: 2, ..Sweep::default() }, world, 0.0, 13), 20, 0.5);
+    let widest = |scene: &SyntheticScene| {
+        let found = rolls(scene, PriorMethod::VanishingPoints).expect("vertical lines in both photographs");
+        found.iter().flatten().map(|roll| roll.within.to_degrees()).fold(0.0, f64::max)
+    };
+    let sloping = level.on_a_slope(2.5);
+    let found = rolls(&sloping, PriorMethod::VanishingPoints).expect("vertical lines in both photographs");
+    for (roll, truth) in found.iter().flatten().zip(&sloping.roll) {
+        assert!(wrap_angle(roll.roll - truth).abs() <= roll.within, "{roll:?}, true {truth}");
+    }
+    assert!(widest(&level) < widest(&sloping), "{} {}", widest(&level), widest(&sloping));
+}

@@ -115,6 +115,19 @@ impl SyntheticScene {
         run(&self.input(&VanishingOptions::default()), options, &StageContext::default()).expect("a well-formed scene")
     }
 
+    /// The same with all level lines along a slope: of the 20 of each of three directions, of which the second is the vertical, those of the others.
+    pub(crate) fn on_a_slope(&self, slope_deg: f64) -> Self {
+        let mut sloping = self.clone();
+        let mut generator = StageContext::default().generator("slope", 0);
+        let slope = rotation_about_x(slope_deg.to_radians());
+        for (lines, rotation) in sloping.lines.iter_mut().zip(&self.world_from_camera) {
+            let along = photograph_lines(&(rotation.transpose() * slope), 20, 0, 0.5, &mut generator);
+            lines[0..20].copy_from_slice(&along[0..20]);
+            lines[40..60].copy_from_slice(&along[40..60]);
+        }
+        sloping
+    }
+
     /// Per photograph |theta - roll| in degrees.
     pub(crate) fn errors_deg(&self, prior: &SimilarityPrior) -> Vec<f64> {
         let error = |(theta, roll): (&f64, &f64)| trueup_core::geometry::wrap_angle(theta - roll).abs().to_degrees();

@@ -24,7 +24,7 @@ use super::witnesses::{Reconciled, reconciled};
 use crate::vanishing::{InterpretationPlanes, RefinedTriad};
 
 /// Fewest photographs whose level lines may be found to lie along a slope: of two, nothing but the few sectors they show tells how upright and level
-/// lines scatter. Measured: of 164 pairs the mean lean is the same either way, of 145 triples 0.26 degrees with it and 0.30 without.
+/// lines scatter. By a model of this on the segments of cut sets, the mean lean of 164 pairs is the same either way, that of 145 triples 0.26 degrees with it and 0.30 without.
 const MIN_SLOPING_PHOTOGRAPHS: usize = 3;
 /// How probable it is that level lines lie along a slope, where they are not heard at all.
 const SLOPING: f64 = 0.5;
@@ -101,18 +101,9 @@ pub(super) fn guide(
     };
     let mut down = level.down;
     if let Some(dominant) = accepted {
-        let before = guidance.clone();
         match scene.solve_dominant(dominant, &mut guidance) {
             Ok(upright) => return Ok(Guided { guidance, upright: Some(upright), level: down }),
             Err(level) => down = level,
-        }
-        // Where the directions that photographs agree on leave the vertical open, those of all segments together may not.
-        let mut again = before;
-        let other = pooled.filter(|_| !again.pooled && options.gate != GateMode::Paper);
-        if let Some(dominant) = other.and_then(|pooled| scene.pooled(&pooled, &mut again))
-            && let Ok(upright) = scene.solve_dominant(dominant, &mut again)
-        {
-            return Ok(Guided { guidance: again, upright: Some(upright), level: down });
         }
     }
     let upright = scene.vertical_alone(&mut guidance);
