@@ -11,7 +11,7 @@ use trueup_core::geometry::{exp_rotation, nearest_rotation};
 use trueup_core::matches::PairMatches;
 
 use super::joint::{AxisWeights, LineVote, scales};
-use super::turn_equations::TurnEquations;
+use super::turn_equations::{RelativeCertainty, TurnEquations};
 
 /// Where there is parallax, a relative rotation absorbs most of it: the mean of the reciprocal depths of an overlap,
 /// which acts like a rotation about the photograph's axes, is several times their spread, which is what remains to be
@@ -24,15 +24,6 @@ const ABSORBED_ALONG: f64 = 1.5;
 const LINE_ERROR_PX: f64 = 0.5;
 /// Least error of an overlap's relative rotation, working pixels; where the matches show parallax, that counts.
 const MIN_OVERLAP_ERROR_PX: f64 = 0.1;
-
-/// How sure an overlap is of the relative rotation of two cameras.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct RelativeCertainty {
-    pub i: usize,
-    pub j: usize,
-    /// Inverse covariance of the relative rotation in the common frame, 1 / rad^2.
-    pub information: Matrix3<f64>,
-}
 
 /// The certainty of every overlap from how its matches deviate from where the cameras put them.
 ///

@@ -23,7 +23,9 @@ use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 
 use super::camera_correction::{corrected_rotations, relative_certainties, turn_covariances};
-use super::jackknife::{MIN_SECTORS, without_each_sector, without_some_photographs};
+use super::jackknife::{
+    MIN_SECTORS, SCENE_DEVIATION_DEG, axis_covariance, without_each_sector, without_some_photographs,
+};
 use super::joint::{AxisWeights, LineVote, Refinement};
 use super::prior::{SimilarityPrior, VerticalSpread};
 use super::vertical::roll_of;
@@ -32,10 +34,6 @@ use crate::vanishing::{InterpretationPlanes, VERTICAL_LINE_DEG};
 
 /// Fewer photographs tell nothing of how they scatter: of two, Student's t is 12.7.
 const MIN_GROUPS: usize = 3;
-/// Standard deviation, about any level axis, of what all lines of a scene err by alike, degrees. Fitted on 100 photographs of rendered rooms, whose level
-/// is exact (which need none), and 267 cut from panoramas: the smallest hundredth with which the 95 % interval holds the truth of 95 % of either.
-/// docs/quality.md has the coverage on others.
-pub(super) const SCENE_DEVIATION_DEG: f64 = 0.02;
 /// Fewest photographs that must show vertical lines, three each: a single one has nothing to agree with.
 const MIN_PHOTOGRAPHS: usize = 2;
 /// Where no prior was believed, the vertical is sought so near to where the cameras expect it, degrees.
@@ -88,10 +86,8 @@ pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRol
     }
     let UprightScene { frame, vertical, axes_used, axis_weights, .. } = &scene;
     let refinement = Refinement { start: frame, axes_used: *axes_used, axis_weights };
-    let sign = down.dot(&frame.column(*vertical)).signum();
     let scatter = |frames: Vec<Matrix3<f64>>, fewest: usize| {
-        let downs: Vec<Vector3<f64>> = frames.iter().map(|other| other.column(*vertical) * sign).collect();
-        Scatter::of(&downs).filter(|scatter| scatter.groups >= fewest)
+        Scatter::of(&frames, *vertical).filter(|scatter| scatter.groups >= fewest)
     };
     let by_sectors = scatter(without_each_sector(&vote, refinement, *vertical), MIN_SECTORS)?;
     let by_photographs = scatter(without_some_photographs(&vote, refinement), MIN_GROUPS);
@@ -191,13 +187,10 @@ struct Scatter {
 }
 
 impl Scatter {
-    /// The jackknife of the verticals found without one group each; `None` without any.
-    fn of(downs: &[Vector3<f64>]) -> Option<Self> {
-        let groups = downs.len();
-        let count = groups as f64;
-        let mean = downs.iter().sum::<Vector3<f64>>() / count;
-        let spread: Matrix3<f64> = downs.iter().map(|down| (down - mean) * (down - mean).transpose()).sum();
-        (groups > 0).then_some(Self { covariance: spread * ((count - 1.0) / count), groups })
+    /// The jackknife of the verticals, column `vertical` of the frames found without one group each; `None` without any.
+    fn of(frames: &[Matrix3<f64>], vertical: usize) -> Option<Self> {
+        let groups = frames.len();
+        (groups > 0).then(|| Self { covariance: axis_covariance(frames, vertical), groups })
     }
 
     /// That of a spread.
@@ -253,11 +246,12 @@ mod tests {
     /// Verticals at 1 and -1 hundredths about x and z, four sectors: mean 0, sums of squares 2e-4, times 3/4.
     #[test]
     fn the_jackknife_of_known_verticals() {
-        let down = |x: f64, z: f64| Vector3::new(x, 0.0, z);
-        let scatter = Scatter::of(&[down(0.01, 0.0), down(-0.01, 0.0), down(0.0, 0.01), down(0.0, -0.01)]);
+        let down =
+            |x: f64, z: f64| Matrix3::from_columns(&[Vector3::zeros(), Vector3::new(x, 0.0, z), Vector3::zeros()]);
+        let scatter = Scatter::of(&[down(0.01, 0.0), down(-0.01, 0.0), down(0.0, 0.01), down(0.0, -0.01)], 1);
         let expected = Matrix3::from_diagonal(&Vector3::new(1.5e-4, 0.0, 1.5e-4));
         assert!((scatter.expect("four").covariance - expected).norm() < 1e-15);
-        assert_eq!(Scatter::of(&[]), None);
+        assert_eq!(Scatter::of(&[], 1), None);
     }
 
     /// A level camera that looks along z: a turn about z of the scene is its roll, one about x is none of it.

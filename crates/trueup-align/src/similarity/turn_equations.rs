@@ -10,12 +10,20 @@ use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
 
 use super::block_matrix::BlockMatrix;
-use super::camera_correction::RelativeCertainty;
 
 /// Information, 1 / rad^2, that keeps turns where neither segments nor overlaps say anything: far less than either says.
 const HOLD: f64 = 1.0;
 /// Photographs whose columns of the inverse are found at once. A number of its own, so that the sums are the same for any number of threads.
 const AT_ONCE: usize = 16;
+
+/// How sure an overlap is of the relative rotation of two cameras.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RelativeCertainty {
+    pub i: usize,
+    pub j: usize,
+    /// Inverse covariance of the relative rotation in the common frame, 1 / rad^2.
+    pub information: Matrix3<f64>,
+}
 
 /// The equations' factor.
 pub(super) struct TurnEquations {

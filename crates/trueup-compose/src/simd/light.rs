@@ -186,11 +186,11 @@ fn center(positions: &Positions, index: usize) -> [f32; 2] {
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use std::arch::x86_64::{
-        __m256, _mm_loadu_ps, _mm_storeu_ps, _mm256_add_ps, _mm256_and_si256, _mm256_castps_si256,
-        _mm256_castps128_ps256, _mm256_castps256_ps128, _mm256_cvtepi32_ps, _mm256_div_ps, _mm256_extractf128_ps,
-        _mm256_insertf128_ps, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps, _mm256_min_ps, _mm256_mul_ps,
-        _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_storeu_si256,
-        _mm256_sub_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
+        __m256, _mm_loadu_ps, _mm_storeu_ps, _mm256_add_ps, _mm256_castps_si256, _mm256_castps128_ps256,
+        _mm256_castps256_ps128, _mm256_cvtepi32_ps, _mm256_div_ps, _mm256_extractf128_ps, _mm256_insertf128_ps,
+        _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps, _mm256_min_ps, _mm256_mul_ps, _mm256_set1_ps,
+        _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_storeu_si256, _mm256_sub_ps, _mm256_unpackhi_ps,
+        _mm256_unpacklo_ps,
     };
     use std::ops::Range;
 
@@ -294,13 +294,12 @@ mod x86 {
         let rounding = _mm256_set1_ps(ROUNDING);
         let rounded = _mm256_add_ps(_mm256_sub_ps(positions, _mm256_set1_ps(0.5)), rounding);
         let beyond = _mm256_sub_ps(positions, _mm256_sub_ps(rounded, rounding));
-        let indices = _mm256_and_si256(_mm256_castps_si256(rounded), _mm256_set1_epi32(ENTRIES as i32 - 1));
         let mut at = [0_i32; LANES];
         // SAFETY: there is room for eight.
-        unsafe { _mm256_storeu_si256(at.as_mut_ptr().cast(), indices) };
+        unsafe { _mm256_storeu_si256(at.as_mut_ptr().cast(), _mm256_castps_si256(rounded)) };
         // In the order in which the halves of both vectors are taken apart below. Read one by one: a gather is no faster, and not every emulator
-        // reads the same.
-        let entries = [0, 1, 4, 5, 2, 3, 6, 7].map(|lane: usize| table.entries()[at[lane] as usize & (ENTRIES - 1)]);
+        // reads the same. Their low bits are the whole numbers.
+        let entries = [0, 1, 4, 5, 2, 3, 6, 7].map(|lane: usize| table.entries()[at[lane] as usize % ENTRIES]);
         // SAFETY: eight entries are sixteen floats.
         let (first, second) = unsafe {
             let floats: *const f32 = entries.as_ptr().cast();
