@@ -27,6 +27,9 @@ pub(super) struct CameraAngle {
     pub angle: f64,
     /// In standard deviations of the cameras' own vertical, as their rolls leave it.
     pub deviations: f64,
+    /// Root mean square of the photographs' rolls by it in radians, where nothing but the expectation that they look level tells how far up or down they
+    /// look; `None` elsewhere.
+    pub rolls: Option<f64>,
 }
 
 impl CameraAngle {
@@ -36,6 +39,12 @@ impl CameraAngle {
         // Not-a-number is too wide.
         let is_near = self.angle.to_degrees() <= MAX_CAMERA_ANGLE_DEG || self.deviations <= MAX_CAMERA_DEVIATIONS;
         !is_near
+    }
+
+    /// Whether photographs that look up or down alike explain it.
+    pub(super) fn is_steep(self) -> bool {
+        let held_level = self.rolls.is_some_and(|rolls| rolls.to_degrees() <= MAX_CAMERA_ANGLE_DEG);
+        held_level && self.angle.to_degrees() <= MAX_STEEP_DEG
     }
 }
 
@@ -54,6 +63,12 @@ const CONFIRMING_SIGNIFICANCE: f64 = 5.0;
 const MAX_CAMERA_ANGLE_DEG: f64 = 20.0;
 /// ... unless it is this few of the cameras' own deviations.
 const MAX_CAMERA_DEVIATIONS: f64 = 2.0;
+/// Largest angle of the same where photographs that all look up or down explain it, as two of a tower do: beyond, what lies level before the camera is as
+/// near, degrees.
+const MAX_STEEP_DEG: f64 = 45.0;
+/// Share of the divergence that is believed there: 2.8 times as many directions lie within 45 degrees of pitch and 20 of roll as within 20 of the vertical,
+/// and the chance that unrelated triads meet falls with the cube of the angle, the divergence's power of 3/2.
+const STEEP_DIVERGENCE_SHARE: f64 = 0.5;
 /// Largest median roll of the agreeing photographs, degrees.
 const MAX_MEDIAN_ROLL_DEG: f64 = 45.0;
 
@@ -119,7 +134,8 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
             "the lines of all photographs together prefer no direction clearly ({significance} standard deviations, {needed} needed)"
         ));
     }
-    if let Some(wide) = from_cameras.filter(|found| found.is_too_wide()) {
+    let agree_closely = divergence <= STEEP_DIVERGENCE_SHARE * allowed;
+    if let Some(wide) = from_cameras.filter(|found| found.is_too_wide() && !(found.is_steep() && agree_closely)) {
         let (angle, allowed) = told_apart(wide.angle.to_degrees(), MAX_CAMERA_ANGLE_DEG, 1);
         return Some(format!(
             "the dominant vertical is {angle} degrees from the vertical of the cameras ({allowed} allowed)"
@@ -144,6 +160,29 @@ fn told_apart(value: f64, limit: f64, decimals: usize) -> (String, String) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn photographs_that_look_up_alike_may_be_far_from_level() {
+        let refused = |divergence: f64, angle_deg: f64, rolls_deg: Option<f64>| {
+            let rolls = rolls_deg.map(f64::to_radians);
+            let from_cameras = Some(CameraAngle { angle: angle_deg.to_radians(), deviations: 6.0, rolls });
+            let evidence = GateEvidence {
+                photographs: 2,
+                inliers: 2,
+                divergence,
+                from_cameras,
+                significance: Some(6.0),
+                median_roll: 0.05,
+            };
+            failed_clause(&evidence, &SimilarityOptions::default()).is_some()
+        };
+        assert!(!refused(0.0099, 30.0, Some(4.0)));
+        assert!(refused(0.0101, 30.0, Some(4.0)), "twice the directions lie there, and have to agree more closely");
+        assert!(refused(0.001, 46.0, Some(4.0)), "what lies level in front is as near");
+        assert!(refused(0.001, 30.0, Some(21.0)), "the photographs would be rolled");
+        assert!(refused(0.001, 30.0, None), "the cameras tell");
+        assert!(!refused(0.019, 19.0, None));
+    }
 
     #[test]
     fn a_refused_value_is_not_told_as_its_limit() {

@@ -149,7 +149,14 @@ impl<'a> CameraLevel<'a> {
             (false, false) => return None,
         };
         let squares: f64 = self.says.iter().map(|say| say.squares_beyond(down)).sum();
-        Some(CameraAngle { angle: own.angle(down), deviations: squares.sqrt() })
+        let squared_rolls = self.rotations.iter().map(|rotation| (rotation * down).x.asin().powi(2));
+        let rolls = (squared_rolls.sum::<f64>() / self.rotations.len() as f64).sqrt();
+        let pitch_is_untold = !self.has_gravity && self.rotations.len() == 2;
+        Some(CameraAngle {
+            angle: own.angle(down),
+            deviations: squares.sqrt(),
+            rolls: pitch_is_untold.then_some(rolls),
+        })
     }
 
     /// What told of `down`, and of how much.

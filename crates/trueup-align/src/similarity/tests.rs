@@ -167,6 +167,18 @@ fn the_gate_accepts_noisy_manhattan_scenes() {
 }
 
 #[test]
+fn two_photographs_that_look_up_alike_are_guided() {
+    for pitch_base_deg in [-40.0, -25.0, 30.0] {
+        let world = World::Manhattan { noise_deg: 0.5, bad_share: 0.0 };
+        let scene = SyntheticScene::new(Sweep { count: 2, pitch_base_deg, ..Sweep::default() }, world, 0.2, 7);
+        let prior = scene.prior(&paper());
+        assert!(prior.guidance.used, "{pitch_base_deg}: {:?}", prior.guidance.failed_clause);
+        assert!(mean(&scene.errors_deg(&prior)) < 1.0, "{pitch_base_deg}");
+    }
+    assert!(accepted(World::Random, 0.3, 2) <= 2);
+}
+
+#[test]
 fn gauss_newton_reaches_the_procrustes_solution() {
     let mut generator = StageContext::default().generator("procrustes", 0);
     for _ in 0..3 {

@@ -8,7 +8,7 @@ use trueup_core::{Result, StageContext};
 use super::camera_correction::{corrected_rotations, relative_certainties};
 use super::dominant::{Dominant, dominant_frame};
 use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrame, search_frame};
-use super::gate::{CameraAngle, GateEvidence, allowed_divergence, divergence, failed_clause};
+use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
 use super::jackknife::{axis_deviations, deviation_by_sectors};
 use super::joint::{self, AxisWeights, LineVote, Refinement};
@@ -35,14 +35,10 @@ const MAX_REFINEMENT_TOLERANCES: f64 = 2.0;
 /// Root mean square misorientation of the photographs' directions that is detection noise, degrees; beyond, the
 /// horizontal directions lose weight in the joint refinement.
 const ORDINARY_MISORIENTATION_DEG: f64 = 1.0;
-/// Largest standard deviation of the vertical, by asking different photographs, at which the pooled search guides in place of
-/// directions that the photographs agree on, degrees: wrong frames that stand out by chance scatter by more. Measured: chosen on the
-/// 130 sets of the gate's experiment and on real sets.
-const MAX_POOLED_DEVIATION_DEG: f64 = 1.0;
 /// Least share of the information on the vertical that makes lines its guide; with less they are one voice among others.
 const GUIDING_SHARE: f64 = 0.5;
 /// Largest standard deviation of the vertical at which lines guide, degrees: so few photographs have lines beyond that what their scatter says of
-/// single cameras is little. Reasoned.
+/// single cameras is little; and wrong frames that stand out by chance in the pooled search scatter by more. Reasoned.
 const MAX_GUIDING_DEVIATION_DEG: f64 = 3.0;
 /// Lines whose vertical is farther than this from the one that cameras recorded are not those of what stands upright, degrees, unless
 /// both are less certain. Reasoned: no sensor errs by as much, and roofs lean by more.
@@ -192,7 +188,7 @@ impl<'a> SceneDirections<'a> {
     fn pooled(&self, pooled: &PooledFrame, guidance: &mut Guidance) -> Option<Dominant> {
         let down = self.vertical(&pooled.frame);
         let stands_out = pooled.significance >= GUIDING_SIGNIFICANCE;
-        if !stands_out || self.level.angle_to(&down).is_some_and(CameraAngle::is_too_wide) {
+        if !stands_out || self.level.angle_to(&down).is_some_and(|found| found.is_too_wide() && !found.is_steep()) {
             return None;
         }
         let residuals =
@@ -273,10 +269,10 @@ impl<'a> SceneDirections<'a> {
             return Ok(*lines);
         }
         let degrees = deviation.to_degrees();
-        if guidance.pooled && degrees > MAX_POOLED_DEVIATION_DEG {
+        if guidance.pooled && degrees > MAX_GUIDING_DEVIATION_DEG {
             guidance.pooled = false;
             guidance.failed_clause = Some(format!(
-                "the lines leave the vertical uncertain by {degrees:.1} degrees ({MAX_POOLED_DEVIATION_DEG:.1} allowed)"
+                "the lines leave the vertical uncertain by {degrees:.1} degrees ({MAX_GUIDING_DEVIATION_DEG:.1} allowed)"
             ));
             return Err(self.level.down);
         }

@@ -204,14 +204,13 @@ fn upright(project: &Project) -> String {
     let slope = manhattan
         .slope_deg
         .map_or(String::new(), |slope| format!("; lines along a slope of {slope:.1} degrees do not count"));
+    let certain = manhattan
+        .vertical_deviation_deg
+        .map_or(String::new(), |deviation| format!(", certain to {deviation:.1} degrees"));
     match (manhattan.accepted, &manhattan.failed_clause) {
-        (true, _) if manhattan.pooled => format!(
-            "guided by the lines of all photographs together{}{slope}",
-            manhattan
-                .vertical_deviation_deg
-                .map_or(String::new(), |deviation| format!(", certain to {deviation:.1} degrees"))
-        ),
-        (true, _) => format!(
+        (true, _) if manhattan.pooled => format!("guided by the lines of all photographs together{certain}{slope}"),
+        (true, Some(_)) => format!("guided by upright lines alone{certain}{slope}"),
+        (true, None) => format!(
             "guided by vanishing points ({}; {} of {} photographs agree){slope}",
             divergence.unwrap_or(trusted),
             manhattan.inliers.len(),

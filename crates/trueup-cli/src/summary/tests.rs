@@ -77,6 +77,15 @@ fn guidance_by_all_lines_together_says_how_certain_it_is() {
     assert!(upright(&project).ends_with("0.3 degrees; lines along a slope of 2.6 degrees do not count"));
 }
 
+/// Directions that were refused are no reason of what guided in their place.
+#[test]
+fn guidance_by_upright_lines_alone_names_no_divergence() {
+    let mut project = project();
+    project.manhattan.failed_clause = Some("the vanishing directions diverge by 0.069 (0.020 allowed)".to_owned());
+    project.manhattan.vertical_deviation_deg = Some(0.85);
+    assert_eq!(upright(&project), "guided by upright lines alone, certain to 0.8 degrees");
+}
+
 #[test]
 fn refused_guidance_is_explained_by_its_reason_alone() {
     let mut project = project();

@@ -41,6 +41,9 @@ fn guidance(project: &Project) -> String {
             "The lines of all photographs together told which way is down, since those of single ones did not agree."
                 .to_owned()
         }
+        (true, false) if found.failed_clause.is_some() => {
+            "Upright lines alone told which way is down, since the directions of others did not agree.".to_owned()
+        }
         (true, false) => format!(
             "Vanishing points told which way is down: those of {} of {} photographs agree.",
             found.inliers.len(),

@@ -34,7 +34,7 @@ pub enum StrangerKind {
         /// The photograph's number.
         of: usize,
     },
-    /// It shows all that each of `of` shows, on a format that no camera has; or, on any format, nothing but what they show together, with no more
+    /// It shows all that each of `of` shows, and more, on a format that no camera has, as these do, or all of one size; or, on any format, nothing but what they show together, with no more
     /// detail.
     Panorama {
         /// At least two photographs' numbers, ascending.
@@ -212,6 +212,15 @@ fn alike(one: f64, other: f64, tolerance: f64) -> bool {
     (one - other).abs() <= tolerance * one.max(other)
 }
 
+fn same_size(one: [f64; 2], other: [f64; 2]) -> bool {
+    (0..2).all(|side| alike(one[side], other[side], SAME_SIDE))
+}
+
+/// Whether cameras write pictures with these sides.
+fn is_camera_format(sides: [f64; 2]) -> bool {
+    CAMERA_FORMATS.iter().any(|camera| alike(sides[0] / sides[1], *camera, FORMAT_TOLERANCE))
+}
+
 /// By the number of each reduced copy the largest picture of its view.
 fn reduced_copies(views: &[SharedView], frames: &[WorkingFrame]) -> BTreeMap<usize, StrangerKind> {
     let mut copies: BTreeMap<usize, usize> = BTreeMap::new();
@@ -265,15 +274,21 @@ fn shown_of(
     frames: &[WorkingFrame],
 ) -> Option<Vec<usize>> {
     let of_picture = sides(&frames[picture]);
-    let format = of_picture[0] / of_picture[1];
-    if CAMERA_FORMATS.iter().any(|camera| alike(format, *camera, FORMAT_TOLERANCE)) {
+    if is_camera_format(of_picture) {
         return superfluous_beside(picture, views, copies, frames);
     }
+    // What was cropped by hand, each picture otherwise, has neither a camera's format nor another one's size.
+    let is_as_taken = |photograph: usize| {
+        let of_photograph = sides(&frames[photograph]);
+        let others = (0..frames.len()).filter(|&other| other != photograph && other != picture);
+        is_camera_format(of_photograph)
+            || others.into_iter().any(|other| same_size(of_photograph, sides(&frames[other])))
+    };
     let mut covered = vec![false; GRID * GRID];
     let (mut whole, mut mostly) = (BTreeSet::new(), BTreeSet::new());
     for (other, of_picture_shown, of_other_shown) in views.iter().filter_map(|view| view.seen_from(picture)) {
-        let of_other = sides(&frames[other]);
-        if copies.contains_key(&other) || (0..2).all(|side| alike(of_picture[side], of_other[side], SAME_SIDE)) {
+        let is_part = share(of_picture_shown) < share(of_other_shown) && is_as_taken(other);
+        if copies.contains_key(&other) || !is_part || same_size(of_picture, sides(&frames[other])) {
             continue;
         }
         covered.iter_mut().zip(of_picture_shown).for_each(|(covered, shown)| *covered |= shown);

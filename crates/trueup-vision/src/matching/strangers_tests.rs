@@ -74,6 +74,22 @@ fn a_photograph_of_another_size_in_a_dense_row_is_one() {
 }
 
 /// 1,215 x 810 is a camera's format: a camera with a wider lens may have seen all of them, and what lies above and below.
+/// Two thirds of each neighbor's view is the middle one's, and each was cropped otherwise.
+#[test]
+fn photographs_that_were_cropped_by_hand_are_ones() {
+    let frames = frames(&[[560.0, 330.0], [600.0, 350.0], [530.0, 340.0]]);
+    let row = |b_from_a: [f64; 2]| [pair(0, 1, 1.0, b_from_a[0], 0.0), pair(1, 2, 1.0, b_from_a[1], 0.0)];
+    assert_eq!(found(&frames, &row([-90.0, -110.0])), []);
+}
+
+/// A crop of one of a row shows less than its neighbors.
+#[test]
+fn a_photograph_that_was_cropped_is_one() {
+    let frames = frames(&[[600.0, 400.0], [460.0, 390.0], [600.0, 400.0]]);
+    let pairs = [pair(0, 1, 1.0, -100.0, -5.0), pair(1, 2, 1.0, 30.0, 5.0), pair(0, 2, 1.0, -70.0, 0.0)];
+    assert_eq!(found(&frames, &pairs), []);
+}
+
 #[test]
 fn what_a_camera_can_have_taken_is_a_photograph() {
     assert_eq!(row_and([1215.0, 810.0], 10.0), []);
