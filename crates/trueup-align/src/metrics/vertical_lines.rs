@@ -36,8 +36,38 @@ pub fn vertical_segments(photograph: &VerticalLinesInput) -> Vec<usize> {
     let found = vertical_direction(&planes, &photograph.expected_down);
     // Not a number is no direction either.
     let Some(down) = found.filter(|down| down.x.hypot(down.y) >= MIN_SINE) else { return Vec::new() };
+    pointing_down(&planes, &down)
+}
+
+/// Which of a photograph's segments carry a vertical that is known, by their positions in `photograph.lines`, ascending: those within 1.5 degrees
+/// of `photograph.expected_down`.
+///
+/// Empty if there are fewer than three, or no more than segments of any direction would show by chance, at 99 %; and where there is no upright,
+/// as for [`vertical_segments`].
+pub fn carrying_segments(photograph: &VerticalLinesInput) -> Vec<usize> {
+    let Some(down) = photograph.expected_down.try_normalize(f64::MIN_POSITIVE) else { return Vec::new() };
+    let planes = InterpretationPlanes::new(photograph.lines, photograph.camera, photograph.frame);
+    let segments = if down.xy().norm() >= MIN_SINE { pointing_down(&planes, &down) } else { Vec::new() };
+    if segments.len() >= fewest_carrying(planes.len()) { segments } else { Vec::new() }
+}
+
+/// How many of so many segments must point to the vertical: three, and more than chance lets of segments that point anywhere, at 99 %.
+fn fewest_carrying(segments: usize) -> usize {
+    /// As many make a direction elsewhere, too; two cross in one whatever they are.
+    const LEAST: usize = 3;
+    /// Of a normal distribution 99 % lie below so many standard deviations.
+    const NORMAL_99: f64 = 2.326_348;
+    // Either side of the direction, of half a turn.
+    let share = 2.0 * VERTICAL_LINE_DEG / 180.0;
+    let expected = segments as f64 * share;
+    let by_chance = expected + NORMAL_99 * (expected * (1.0 - share)).sqrt();
+    LEAST.max(by_chance.floor() as usize + 1)
+}
+
+/// The segments within 1.5 degrees of `down`, a unit vector.
+fn pointing_down(planes: &InterpretationPlanes, down: &Vector3<f64>) -> Vec<usize> {
     let tolerance = VERTICAL_LINE_DEG.to_radians().sin();
-    let points_down = |plane: &usize| planes.normals[*plane].dot(&down).abs() <= tolerance;
+    let points_down = |plane: &usize| planes.normals[*plane].dot(down).abs() <= tolerance;
     let mut segments: Vec<usize> = (0..planes.len()).filter(points_down).map(|plane| planes.indices[plane]).collect();
     segments.sort_unstable();
     segments
@@ -144,6 +174,23 @@ mod tests {
         };
         assert!(found(&[], Vector3::y()).is_empty());
         assert!(found(&lines, Vector3::z()).is_empty(), "looks straight down");
+    }
+
+    /// By hand: of 20 segments a sixtieth, 0.33, plus 2.33 deviations of 0.57 are 1.67, so that the least counts; of 400, 6.67 plus 2.33 x 2.56 are 12.6.
+    #[test]
+    fn what_chance_shows_carries_no_vertical() {
+        assert_eq!([0, 20, 400].map(fewest_carrying), [3, 3, 13]);
+        let (lines, frame, camera) = photograph();
+        let down = camera.rotation() * Vector3::y();
+        let carrying = |lines: &[LineSegment], expected_down| {
+            carrying_segments(&VerticalLinesInput { lines, frame: &frame, camera: &camera, expected_down })
+        };
+        assert_eq!(carrying(&lines, down), (0..20).step_by(2).collect::<Vec<usize>>());
+        assert_eq!(carrying(&lines[..5], down), [0, 2, 4]);
+        assert!(carrying(&lines[..4], down).is_empty(), "two");
+        // Where the vertical is known to be elsewhere, its own lines are not asked for another.
+        assert!(carrying(&lines, rotation_about_z(4.0_f64.to_radians()) * down).is_empty());
+        assert!(carrying(&lines, Vector3::z()).is_empty() && carrying(&lines, Vector3::zeros()).is_empty());
     }
 
     /// A camera of focal length 100 px that looks along z: an upright segment points to y, one that runs to the middle to z,

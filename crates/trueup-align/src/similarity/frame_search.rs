@@ -29,13 +29,33 @@ const STEP_DEG: f64 = 2.0;
 /// the 130 sets of the gate's experiment and on real sets.
 pub(super) const GUIDING_SIGNIFICANCE: f64 = 7.0;
 
-/// The best frame and how far it stands out.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PooledFrame {
-    /// Columns are the directions in the common frame, the vertical first; a rotation.
-    pub frame: Matrix3<f64>,
-    /// Score of the frame above the mean over all frames tried, in standard deviations of these.
+/// Verticals whose best frames are refined: within the search's step and tolerance, few segments fit as well elsewhere as at the best. Measured: on cut
+/// sets of a room with one blank wall the first alone ended beside the best one once in nine, the first four never.
+const REFINED: usize = 8;
+
+/// The best frames, and how far the first stands out.
+#[derive(Debug, Clone)]
+pub(super) struct PooledFrames {
+    /// The best frame of each of the best verticals tried, the best first. Columns are the directions in the common frame, the vertical
+    /// first; rotations.
+    starts: Vec<Matrix3<f64>>,
+    /// Score of the first above the mean over all frames tried, in standard deviations of these.
     pub significance: f64,
+}
+
+impl PooledFrames {
+    /// The frame that fits best of those that all segments refine, those of all three directions alike: what made a frame stand out is what
+    /// it is known by. `None` without any.
+    pub(super) fn refined(&self, vote: &LineVote) -> Option<Matrix3<f64>> {
+        let refine = |start: &Matrix3<f64>| {
+            let frame = vote.refine_frame(start, &[1.0; 3]);
+            (frame, vote.fit(&frame))
+        };
+        let refined: Vec<(Matrix3<f64>, f64)> = self.starts.par_iter().map(refine).collect();
+        // Of equals the one that scored better.
+        let best = refined.into_iter().reduce(|best, one| if one.1 > best.1 { one } else { best });
+        best.map(|(frame, _)| frame)
+    }
 }
 
 /// Sums over the turns about one vertical.
@@ -50,7 +70,7 @@ struct Ring {
 ///
 /// The score of a frame is the sum over segments of weight times (1 - (sine / sine of the tolerance)^2) for the frame's
 /// direction that fits best. `None` with fewer than [`MIN_SEGMENTS`] segments.
-pub(super) fn search_frame(vote: &LineVote, expected: &Vector3<f64>) -> Option<PooledFrame> {
+pub(super) fn search_frames(vote: &LineVote, expected: &Vector3<f64>) -> Option<PooledFrames> {
     let segments = vote.longest(MAX_SEGMENTS);
     if segments.len() < MIN_SEGMENTS {
         return None;
@@ -62,20 +82,18 @@ pub(super) fn search_frame(vote: &LineVote, expected: &Vector3<f64>) -> Option<P
     let count = (rings.len() * TURNS) as f64;
     let mean = rings.iter().map(|ring| ring.sum).sum::<f64>() / count;
     let variance = rings.iter().map(|ring| ring.squares).sum::<f64>() / count - mean * mean;
-    let mut best = 0;
-    for (index, ring) in rings.iter().enumerate() {
-        if ring.best > rings[best].best {
-            best = index;
-        }
-    }
-    let significance = (rings[best].best - mean) / variance.sqrt();
-    significance.is_finite().then(|| {
-        let vertical = verticals[best];
+    let mut order: Vec<usize> = (0..rings.len()).collect();
+    order.sort_by(|&one, &other| rings[other].best.total_cmp(&rings[one].best));
+    order.truncate(REFINED);
+    let significance = (rings[*order.first()?].best - mean) / variance.sqrt();
+    let frame = |&index: &usize| {
+        let vertical = verticals[index];
         let (first, second) = orthonormal_complement(&vertical);
-        let (sine, cosine) = turn_of(rings[best].turn).sin_cos();
+        let (sine, cosine) = turn_of(rings[index].turn).sin_cos();
         let horizontal = first * cosine + second * sine;
-        PooledFrame { frame: Matrix3::from_columns(&[vertical, horizontal, vertical.cross(&horizontal)]), significance }
-    })
+        Matrix3::from_columns(&[vertical, horizontal, vertical.cross(&horizontal)])
+    };
+    significance.is_finite().then(|| PooledFrames { starts: order.iter().map(frame).collect(), significance })
 }
 
 fn turn_of(index: usize) -> f64 {

@@ -129,6 +129,21 @@ impl LineVote {
         self.refine(Refinement { start, axes_used: 3, axis_weights }, scales(), |_| true)
     }
 
+    /// How well segments fit a frame: the sum of their weights, each times 1 / (1 + (r / s)^2) of its residual r, with s the last scale of the loss, whose
+    /// complement that is.
+    pub(super) fn fit(&self, frame: &Matrix3<f64>) -> f64 {
+        let mut sum = 0.0;
+        self.for_each_supporter(
+            frame,
+            3,
+            END_SCALE_PX,
+            |_| true,
+            // The robust weight is the square of that.
+            |one| sum += one.weight * (1.0 + (one.residual_px / END_SCALE_PX).powi(2)),
+        );
+        sum
+    }
+
     fn mean_weight(&self) -> f64 {
         let segments: usize = self.photographs.iter().map(|photograph| photograph.planes.len()).sum();
         self.total_weight() / segments.max(1) as f64

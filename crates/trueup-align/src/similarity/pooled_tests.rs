@@ -40,6 +40,30 @@ fn the_segments_of_all_photographs_guide_where_no_photograph_has_directions() {
     assert!(!scene.prior(&alone).guidance.used);
 }
 
+/// Upright lines in two photographs of eight, six each: by these alone the vertical is known badly. The level ones of all photographs tell the rest.
+#[test]
+fn level_lines_of_all_photographs_tell_the_vertical_where_few_are_upright() {
+    let mut scene = without_triads(6, 30);
+    for lines in &mut scene.lines[2..] {
+        lines.drain(6..12);
+    }
+    let prior = scene.prior(&SimilarityOptions::default());
+    assert!(prior.guidance.used && prior.guidance.pooled, "{:?}", prior.guidance.failed_clause);
+    assert!(max(&scene.errors_deg(&prior)) < 0.2, "{:?}", scene.errors_deg(&prior));
+}
+
+/// Segments without noise fit the true frame with all of their weight, and one that is two degrees off with next to nothing of it.
+#[test]
+fn segments_fit_the_frame_they_are_of() {
+    let scene = with_lines(SyntheticScene::new(Sweep::default(), World::Random, 0.0, 11), 0, 0.0);
+    let planes = |k: usize| InterpretationPlanes::new(&scene.lines[k], &scene.cameras[k], &scene.frames[k]);
+    let rotations: Vec<_> = scene.cameras.iter().map(Camera::rotation).collect();
+    let vote = LineVote::new(&rotations, (0..rotations.len()).map(planes).collect());
+    let frame = rotations[0].transpose() * scene.world_from_camera[0].transpose();
+    assert!((vote.fit(&frame) / vote.total_weight() - 1.0).abs() < 1e-6);
+    assert!(vote.fit(&(rotation_about_z(2_f64.to_radians()) * frame)) < 0.7 * vote.total_weight());
+}
+
 #[test]
 fn clutter_stands_out_nowhere() {
     for clutter in [5, 20, 60] {

@@ -7,10 +7,11 @@
 //! * Segments do not err independently. A line is found in pieces, and again in every photograph that shows it; the
 //!   frames of a facade's windows are as plumb as the facade. Sectors of the scene, not segments,
 //!   are what is left out in the jackknife that tells how far the vertical depends on chance. Where one thing fills several
-//!   sectors, leaving out one of them shows nothing; leaving out a photograph may: the jackknife over these is asked as well,
-//!   and the largest counts.
+//!   sectors, leaving out one of them shows nothing; leaving out a photograph may: the jackknife over these is asked as well.
 //! * Upright and level lines may tell of different verticals, each of them sure of its own, as where pavements drain. What is open
 //!   between them (see `witnesses`) is asked as well.
+//! * Each of the three estimates the same variance from a few groups, and is now too small, now too large. Their mean counts: the largest of three is
+//!   nearly always too large.
 //! * Plumb lines are not plumb, level ones not level, lenses and focal lengths a little different from what was found,
 //!   alike in all sectors: no comparison of sectors shows that.
 //! * The turns of single cameras have what segments and overlaps leave open of them.
@@ -59,6 +60,8 @@ pub struct RollsInput<'a> {
 /// A photograph's roll and how sure it is. Radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EstimatedRoll {
+    /// The vertical in the camera's frame, a unit vector.
+    pub down: Vector3<f64>,
     /// The angle from the photograph's down to the vertical: the clockwise turn that stands it upright.
     pub roll: f64,
     /// Its standard error.
@@ -86,19 +89,14 @@ pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRol
     }
     let UprightScene { frame, vertical, axes_used, axis_weights, .. } = &scene;
     let refinement = Refinement { start: frame, axes_used: *axes_used, axis_weights };
-    let scatter = |frames: Vec<Matrix3<f64>>, fewest: usize| {
-        Scatter::of(&frames, *vertical).filter(|scatter| scatter.groups >= fewest)
-    };
+    let scatter = |frames: Vec<Matrix3<f64>>, fewest: usize| Scatter::of(&frames, *vertical, fewest);
     let by_sectors = scatter(without_each_sector(&vote, refinement, *vertical), MIN_SECTORS)?;
     let by_photographs = scatter(without_some_photographs(&vote, refinement), MIN_GROUPS);
-    let by_kinds = scene.spread.as_ref().map(Scatter::of_spread).filter(|scatter| scatter.groups >= MIN_GROUPS);
-    let scatters: Vec<Scatter> = std::iter::once(by_sectors).chain(by_photographs).chain(by_kinds).collect();
+    let by_kinds = scene.spread.as_ref().and_then(Scatter::of_spread);
+    let scatter = Scatter::mean(by_sectors, by_photographs.into_iter().chain(by_kinds));
     let certainties = relative_certainties(&scene.cameras(input), input.edges);
     let turns = turn_covariances(&scene.rotations, &certainties, &vote, frame, axis_weights)?;
-    let estimate = |(rotation, turn): (&Matrix3<f64>, &Matrix3<f64>)| {
-        let estimates = scatters.iter().filter_map(|scatter| scatter.estimate(&down, rotation, turn));
-        estimates.max_by(|one, other| one.within.total_cmp(&other.within))
-    };
+    let estimate = |(rotation, turn): (&Matrix3<f64>, &Matrix3<f64>)| scatter.estimate(&down, rotation, turn);
     Some(scene.rotations.iter().zip(&turns).map(estimate).collect())
 }
 
@@ -182,20 +180,30 @@ impl UprightScene {
 struct Scatter {
     /// Covariance of the vertical's direction, rad^2.
     covariance: Matrix3<f64>,
-    /// How many sectors, or groups of photographs, there are.
-    groups: usize,
+    /// Degrees of freedom that it is estimated with.
+    freedom: usize,
 }
 
 impl Scatter {
-    /// The jackknife of the verticals, column `vertical` of the frames found without one group each; `None` without any.
-    fn of(frames: &[Matrix3<f64>], vertical: usize) -> Option<Self> {
+    /// The jackknife of the verticals, column `vertical` of the frames found without one group each; `None` with fewer than `fewest`, which is two or more.
+    fn of(frames: &[Matrix3<f64>], vertical: usize, fewest: usize) -> Option<Self> {
         let groups = frames.len();
-        (groups > 0).then(|| Self { covariance: axis_covariance(frames, vertical), groups })
+        (groups >= fewest).then(|| Self { covariance: axis_covariance(frames, vertical), freedom: groups - 1 })
     }
 
-    /// That of a spread.
-    fn of_spread(spread: &VerticalSpread) -> Self {
-        Self { covariance: matrix_from_rows(&spread.covariance), groups: spread.groups }
+    /// That of a spread; `None` of fewer groups than tell anything. It is of the sectors, or photographs, that others are of, and adds no degrees of freedom.
+    fn of_spread(spread: &VerticalSpread) -> Option<Self> {
+        let covariance = matrix_from_rows(&spread.covariance);
+        (spread.groups >= MIN_GROUPS).then_some(Self { covariance, freedom: 0 })
+    }
+
+    /// The mean of several estimates of one covariance, with the degrees of freedom of all.
+    fn mean(first: Self, others: impl Iterator<Item = Self>) -> Self {
+        let (sum, count) = others.fold((first, 1.0), |(sum, count), one| {
+            let freedom = sum.freedom + one.freedom;
+            (Self { covariance: sum.covariance + one.covariance, freedom }, count + 1.0)
+        });
+        Self { covariance: sum.covariance / count, ..sum }
     }
 
     /// The roll of a camera, which `rotation` takes the world to, and whose own turn has the covariance `turn`.
@@ -209,9 +217,9 @@ impl Scatter {
         let scatter = by_down.dot(&(self.covariance * by_down));
         let alike = by_turn.norm_squared() * SCENE_DEVIATION_DEG.to_radians().powi(2);
         let own = by_turn.dot(&(turn * by_turn));
-        let within = (student_95(self.groups - 1).powi(2) * scatter + NORMAL_95.powi(2) * (alike + own)).sqrt();
+        let within = (student_95(self.freedom).powi(2) * scatter + NORMAL_95.powi(2) * (alike + own)).sqrt();
         let standard_error = (scatter + alike + own).sqrt();
-        Some(EstimatedRoll { roll: roll_from_down(&seen), standard_error, within })
+        Some(EstimatedRoll { down: seen, roll: roll_from_down(&seen), standard_error, within })
     }
 }
 
@@ -248,17 +256,27 @@ mod tests {
     fn the_jackknife_of_known_verticals() {
         let down =
             |x: f64, z: f64| Matrix3::from_columns(&[Vector3::zeros(), Vector3::new(x, 0.0, z), Vector3::zeros()]);
-        let scatter = Scatter::of(&[down(0.01, 0.0), down(-0.01, 0.0), down(0.0, 0.01), down(0.0, -0.01)], 1);
+        let scatter = Scatter::of(&[down(0.01, 0.0), down(-0.01, 0.0), down(0.0, 0.01), down(0.0, -0.01)], 1, 4);
         let expected = Matrix3::from_diagonal(&Vector3::new(1.5e-4, 0.0, 1.5e-4));
         assert!((scatter.expect("four").covariance - expected).norm() < 1e-15);
-        assert_eq!(Scatter::of(&[], 1), None);
+        assert_eq!(scatter.map(|scatter| scatter.freedom), Some(3));
+        assert_eq!(Scatter::of(&[down(0.01, 0.0)], 1, 2), None);
+    }
+
+    /// By hand: diagonals 1, 4, 7 come to 4; three and five degrees of freedom, and none of what is of the same groups.
+    #[test]
+    fn estimates_of_one_scatter_are_averaged() {
+        let of = |variance: f64, freedom| Scatter { covariance: Matrix3::identity() * variance, freedom };
+        let mean = Scatter::mean(of(1.0, 3), [of(4.0, 5), of(7.0, 0)].into_iter());
+        assert!((mean.covariance - Matrix3::identity() * 4.0).norm() < 1e-12 && mean.freedom == 8);
+        assert_eq!(Scatter::mean(of(1.0, 3), std::iter::empty()), of(1.0, 3));
     }
 
     /// A level camera that looks along z: a turn about z of the scene is its roll, one about x is none of it.
     #[test]
     fn a_level_camera_rolls_as_far_as_the_vertical_leans_across() {
         let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 0.0, 9e-4));
-        let scatter = Scatter { covariance, groups: 31 };
+        let scatter = Scatter { covariance, freedom: 30 };
         let (down, level) = (Vector3::y(), Matrix3::identity());
         let found = scatter.estimate(&down, &level, &Matrix3::zeros()).expect("level");
         let alike = SCENE_DEVIATION_DEG.to_radians().powi(2);

@@ -7,7 +7,7 @@ use trueup_core::{Result, StageContext};
 
 use super::camera_correction::{corrected_rotations, relative_certainties};
 use super::dominant::{Dominant, dominant_frame};
-use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrame, search_frame};
+use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrames, search_frames};
 use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
 use super::jackknife::{axis_deviations, deviation_by_sectors};
@@ -82,24 +82,32 @@ pub(super) fn guide(
     let cut = if options.as_printed.dominant { f64::INFINITY } else { options.rejection };
     let dominant = dominant_frame(&scene.triads, cut, &mut generator);
     context.check_cancelled()?;
-    let pooled = options.pooled_search.then(|| search_frame(&scene.vote, &level.down)).flatten();
-    guidance.significance = pooled.map(|pooled| pooled.significance);
+    let pooled = options.pooled_search.then(|| search_frames(&scene.vote, &level.down)).flatten();
+    guidance.significance = pooled.as_ref().map(|pooled| pooled.significance);
     guidance.failed_clause = match &dominant {
         Some(dominant) => scene.judge(dominant, &mut guidance),
         None => Some("no photograph has vanishing directions".to_owned()),
     };
     context.check_cancelled()?;
-    let accepted = match guidance.failed_clause {
-        None => dominant,
-        // The published gate knows no other frame than the one that the photographs agree on.
-        Some(_) if options.gate == GateMode::Paper => None,
-        Some(_) => pooled.and_then(|pooled| scene.pooled(&pooled, &mut guidance)),
-    };
     let mut down = level.down;
-    if let Some(dominant) = accepted {
+    let (before, triads) = (guidance.clone(), scene.triads.clone());
+    if let Some(dominant) = dominant.filter(|_| guidance.failed_clause.is_none()) {
         match scene.solve_dominant(dominant, &mut guidance) {
             Ok(upright) => return Ok(Guided { guidance, upright: Some(upright), level: down }),
             Err(level) => down = level,
+        }
+    }
+    // The published gate knows no other frame than the one that the photographs agree on.
+    if let Some(pooled) = pooled.filter(|_| options.gate == GateMode::Full) {
+        scene.triads = triads;
+        let mut again = Guidance { failed_clause: guidance.failed_clause.clone(), ..before.clone() };
+        if let Some(dominant) = scene.pooled(&pooled, &mut again) {
+            match scene.solve_dominant(dominant, &mut again) {
+                Ok(upright) => return Ok(Guided { guidance: again, upright: Some(upright), level: down }),
+                // What refuses it says nothing of directions that photographs agreed on, whose own refusal stands.
+                Err(level) if before.failed_clause.is_some() => (guidance, down) = (again, level),
+                Err(_) => {}
+            }
         }
     }
     let upright = scene.vertical_alone(&mut guidance);
@@ -184,16 +192,19 @@ impl<'a> SceneDirections<'a> {
         failed_clause(&evidence, self.options)
     }
 
-    /// The frame of the pooled search in place of one that the photographs agree on, if it stands out far enough.
-    fn pooled(&self, pooled: &PooledFrame, guidance: &mut Guidance) -> Option<Dominant> {
-        let down = self.vertical(&pooled.frame);
+    /// The frame of the pooled search, if it stands out far enough: for where photographs agree on none, or on one that leaves the vertical open.
+    fn pooled(&self, pooled: &PooledFrames, guidance: &mut Guidance) -> Option<Dominant> {
         let stands_out = pooled.significance >= GUIDING_SIGNIFICANCE;
-        if !stands_out || self.level.angle_to(&down).is_some_and(|found| found.is_too_wide() && !found.is_steep()) {
+        if !stands_out {
             return None;
         }
-        let residuals =
-            self.triads.iter().map(|triad| triad.map(|triad| triad_residual(&pooled.frame, &triad))).collect();
-        let dominant = Dominant { frame: pooled.frame, residuals };
+        let frame = pooled.refined(&self.vote)?;
+        let from_cameras = self.level.angle_to(&self.vertical(&frame));
+        if from_cameras.is_some_and(|found| found.is_too_wide() && !found.is_steep()) {
+            return None;
+        }
+        let residuals = self.triads.iter().map(|triad| triad.map(|triad| triad_residual(&frame, &triad))).collect();
+        let dominant = Dominant { frame, residuals };
         guidance.pooled = true;
         guidance.inliers = self.inliers(&dominant);
         guidance.residuals.clone_from(&dominant.residuals);
@@ -228,7 +239,7 @@ impl<'a> SceneDirections<'a> {
         if joint {
             let vertical = column_near(&frame, &down);
             let refinement = Refinement { start: &frame, axes_used: 3, axis_weights: &axis_weights };
-            let deviation = self.deviation(refinement, vertical, asked.as_ref());
+            let deviation = self.deviation(refinement, vertical, asked.as_ref(), guidance.pooled);
             down = self.weighed(&down, deviation, guidance)?;
         }
         guidance.spread = reconciled.map(|found| VerticalSpread::about(&down, &found));
@@ -245,14 +256,21 @@ impl<'a> SceneDirections<'a> {
 
     /// Standard deviation in radians of the vertical, column `vertical` of a frame that lines refined, by asking different photographs; or without one
     /// sector of the scene each, where that is beyond what may guide: then all photographs know it from one and the same thing. What is
-    /// `reconciled` knows that already.
-    fn deviation(&self, refinement: Refinement<'_>, vertical: usize, reconciled: Option<&Reconciled>) -> f64 {
+    /// `reconciled` knows that already. Of a frame of all lines together (`pooled`) the larger counts in any case: single photographs agree on nothing.
+    fn deviation(
+        &self,
+        refinement: Refinement<'_>,
+        vertical: usize,
+        reconciled: Option<&Reconciled>,
+        pooled: bool,
+    ) -> f64 {
         let by_photographs = axis_deviations(&self.vote, refinement)[vertical];
         let by_sectors = match reconciled {
             Some(found) => Some(found.covariance.trace().sqrt()),
             None => deviation_by_sectors(&self.vote, refinement, vertical),
         };
-        let too_wide = by_sectors.filter(|deviation| *deviation > MAX_GUIDING_DEVIATION_DEG.to_radians());
+        let counts = |deviation: &f64| pooled || *deviation > MAX_GUIDING_DEVIATION_DEG.to_radians();
+        let too_wide = by_sectors.filter(counts);
         too_wide.map_or(by_photographs, |by_sectors| by_sectors.max(by_photographs))
     }
 
@@ -338,7 +356,7 @@ impl<'a> SceneDirections<'a> {
         let (first, second) = orthonormal_complement(&peak.down);
         let frame = Matrix3::from_columns(&[peak.down, first, second]);
         let refinement = Refinement { start: &frame, axes_used: 1, axis_weights: &[1.0; 3] };
-        let deviation = self.deviation(refinement, 0, None);
+        let deviation = self.deviation(refinement, 0, None, false);
         let refused = guidance.clone();
         let Ok(down) = self.weighed(&peak.down, deviation, guidance) else {
             *guidance = refused;
@@ -425,6 +443,10 @@ pub(super) fn axis_weights(frame: &Matrix3<f64>, down: &Vector3<f64>, guidance: 
 
 /// How far photographs agree on the horizontal directions, from 0 to 1.
 fn horizontal_agreement(guidance: &Guidance) -> f64 {
+    // It is known by the lines of all photographs together, the level ones among them, and not by what single photographs say.
+    if guidance.pooled {
+        return 1.0;
+    }
     let residuals = guidance.inliers.iter().filter_map(|&index| guidance.residuals[index]);
     let mean = residuals.sum::<f64>() / guidance.inliers.len().max(1) as f64;
     // r = 4 (1 - cos phi) of the misorientation phi that is ordinary detection noise.

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use trueup_align::metrics::{self, VerticalLinesInput};
 use trueup_align::similarity::{EstimatedRoll, RollsInput, estimated_rolls};
+use trueup_core::camera::Camera;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::{PairMatches, PointMatch};
 use trueup_core::source::WorkingFrame;
@@ -27,8 +28,11 @@ pub(crate) struct EvidencePhotograph {
     /// Its position among all photographs of the project.
     pub position: usize,
     pub frame: WorkingFrame,
-    /// How many of its lines are vertical.
-    pub vertical_lines: usize,
+    /// Its camera, in working pixels.
+    pub camera: Camera,
+    /// Its vertical lines, in working pixels: those that carry the vertical that the lines of all photographs tell, or where these tell none, that it
+    /// has by itself.
+    pub vertical_lines: Vec<LineSegment>,
     /// The roll that the lines of all photographs tell.
     pub roll: Option<EstimatedRoll>,
     pub long_lines: Vec<EvidenceLine>,
@@ -55,11 +59,12 @@ impl Evidence {
     /// That of a group of photographs whose geometry was found.
     pub(crate) fn of(component: &Component, geometry: &Geometry) -> Self {
         let rolls = rolls(component, geometry);
-        let vertical_lines = vertical_lines(component, geometry);
+        let mut vertical_lines = vertical_lines(component, geometry, &rolls);
         let photograph = |k: usize| EvidencePhotograph {
             position: component.members[k],
             frame: component.frames[k],
-            vertical_lines: vertical_lines[k],
+            camera: geometry.cameras.cameras[k],
+            vertical_lines: std::mem::take(&mut vertical_lines[k]),
             roll: rolls[k],
             long_lines: long_lines(component, geometry, k),
         };
@@ -71,20 +76,24 @@ impl Evidence {
     }
 }
 
-/// How many vertical lines each photograph has.
-fn vertical_lines(component: &Component, geometry: &Geometry) -> Vec<usize> {
+/// The vertical lines of each photograph.
+fn vertical_lines(
+    component: &Component,
+    geometry: &Geometry,
+    rolls: &[Option<EstimatedRoll>],
+) -> Vec<Vec<LineSegment>> {
     let down = geometry.prior.level_from_world().row(1).transpose();
-    let count = |k: usize| {
-        let camera = &geometry.cameras.cameras[k];
-        let photograph = VerticalLinesInput {
-            lines: &component.lines[k],
-            frame: &component.frames[k],
-            camera,
-            expected_down: camera.rotation() * down,
+    let of_photograph = |k: usize| -> Vec<LineSegment> {
+        let (lines, camera) = (&component.lines[k], &geometry.cameras.cameras[k]);
+        let expected_down = rolls[k].map_or_else(|| camera.rotation() * down, |known| known.down);
+        let photograph = VerticalLinesInput { lines, frame: &component.frames[k], camera, expected_down };
+        let vertical = match rolls[k] {
+            Some(_) => metrics::carrying_segments(&photograph),
+            None => metrics::vertical_segments(&photograph),
         };
-        metrics::vertical_segments(&photograph).len()
+        vertical.into_iter().map(|line| lines[line]).collect()
     };
-    (0..component.lines.len()).into_par_iter().map(count).collect()
+    (0..component.lines.len()).into_par_iter().map(of_photograph).collect()
 }
 
 /// The roll of every photograph that the lines of all of them tell.

@@ -135,10 +135,7 @@ fn leaning(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Optio
     Some(Diagnostic::warning(
         LEANING,
         Subject::Photograph(place(&photograph.path)?),
-        format!(
-            "what is vertical in its middle leans to the {side} by {:.1} degrees, up to {within:.1} at 95 %",
-            lean.abs()
-        ),
+        format!("what is vertical there leans to the {side} by {:.1} degrees, up to {within:.1} at 95 %", lean.abs()),
         "Look at it there. If it does lean, try --projection auto, or --roll with it.",
     ))
 }

@@ -170,10 +170,10 @@ pub struct BentLine {
 pub struct PhotographMeasures {
     /// Path of the photograph.
     pub path: String,
-    /// Its own vertical lines.
+    /// Its vertical lines: those that carry the vertical that the lines of all photographs tell; where these tell none, those of its own.
     pub vertical_lines: usize,
-    /// By how much what is vertical in its middle leans clockwise in the panorama; `None` if the lines of all
-    /// photographs do not tell, or straight up or down.
+    /// By how much what is vertical leans clockwise in the panorama where its vertical lines are, in the mean of these; `None` if the lines of
+    /// all photographs do not tell, straight up or down, and where fewer than three of its own, or no more than chance shows, carry the vertical.
     pub lean_deg: Option<f64>,
     /// Standard error of the lean.
     pub standard_error_deg: Option<f64>,

@@ -23,7 +23,7 @@ const WIDEST_DEG: f64 = 1.0;
 /// panorama tells apart.
 const PLACES_ALONG_A_SIDE: f64 = 16.0;
 
-/// A photograph's lean in the panorama and the roll it follows from. Radians.
+/// A photograph's lean in the panorama, where its upright lines are, and the roll it follows from. Radians.
 #[derive(Debug, Clone, Copy)]
 struct Lean {
     lean: f64,
@@ -70,11 +70,11 @@ pub(crate) fn run(evidence: &Evidence, arrangement: &Arrangement, images: &[Imag
             .enumerate()
             .map(|(k, lines)| PhotographMeasures {
                 path: path(k),
-                vertical_lines: evidence.photographs[k].vertical_lines,
+                vertical_lines: evidence.photographs[k].vertical_lines.len(),
                 lean_deg: leans[k].map(|one| one.lean.to_degrees()),
                 standard_error_deg: leans[k].map(|one| one.by.standard_error.to_degrees()),
                 within_deg: leans[k].map(|one| one.by.within.to_degrees()),
-                gamma_deg: leans[k].map(|one| one.by.roll.to_degrees()),
+                gamma_deg: evidence.photographs[k].roll.map(|by| by.roll.to_degrees()),
                 certain: certain[k].is_some(),
                 lines,
             })
@@ -82,12 +82,12 @@ pub(crate) fn run(evidence: &Evidence, arrangement: &Arrangement, images: &[Imag
     }
 }
 
-/// The lean of a photograph whose roll the lines of all of them tell, on its grid.
+/// The lean of a photograph whose vertical the lines of all of them tell, on its grid. `None` where too few of its own carry it: nothing there would be
+/// seen to lean.
 fn lean((mesh, photograph): (&GridMesh, &EvidencePhotograph)) -> Option<Lean> {
     let by = photograph.roll?;
-    let lean = mesh.lean_in_the_middle(by.roll);
-    // Where the photograph's middle is not shown, it is no number.
-    (!lean.is_nan()).then_some(Lean { lean, by })
+    let lean = metrics::drawn_lean(mesh, &photograph.camera, &by.down, &photograph.vertical_lines)?;
+    Some(Lean { lean, by })
 }
 
 fn upright(certain: &[Option<Lean>]) -> Option<UprightMeasures> {

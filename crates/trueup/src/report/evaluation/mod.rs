@@ -115,7 +115,7 @@ pub struct PhotographEvaluation {
     pub upright_deg: f64,
     /// By how much the prior's rotation is wrong, relative to the first photograph.
     pub theta_error_deg: Option<f64>,
-    /// By how much the lean that the measures state is wrong; `None` if they state none.
+    /// By how much the vertical that the measures state its lean by is wrong, as drawn in its middle; `None` if they state none.
     pub lean_error_deg: Option<f64>,
 }
 
@@ -174,7 +174,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     let theta_errors = thetas.as_ref().and_then(|thetas| relative_turns(thetas, &gammas, 0));
     let distortion = metrics::local_distortion(&meshes, Outside::Center, period);
     let leans: Vec<Option<StatedLean>> =
-        known.iter().zip(&upright.photographs).map(|(one, &lean)| StatedLean::of(project, one, lean)).collect();
+        (0..known.len()).map(|k| StatedLean::of(project, &known[k], &meshes[k], upright.photographs[k])).collect();
     let photographs = (0..known.len()).map(|k| PhotographEvaluation {
         file: known[k].truth.file.clone(),
         upright_deg: upright.photographs[k].to_degrees(),
@@ -213,10 +213,13 @@ struct StatedLean {
 }
 
 impl StatedLean {
-    fn of(project: &Project, known: &Known, true_lean: f64) -> Option<Self> {
+    /// Leans are stated where vertical lines are, the truth's is in the photograph's middle: there the two verticals are compared, which lean alike elsewhere.
+    fn of(project: &Project, known: &Known, mesh: &GridMesh, true_lean: f64) -> Option<Self> {
         let photographs = &project.measures.as_ref()?.photographs;
         let one = photographs.iter().find(|one| one.path == known.record.path)?;
-        let error_deg = wrap_angle(one.lean_deg?.to_radians() - true_lean).to_degrees();
+        one.lean_deg?;
+        let stated = mesh.lean_in_the_middle(one.gamma_deg?.to_radians());
+        let error_deg = wrap_angle(stated - true_lean).to_degrees();
         Some(Self { error_deg, within_deg: one.within_deg, certain: one.certain, true_deg: true_lean.to_degrees() })
     }
 }

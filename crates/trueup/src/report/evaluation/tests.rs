@@ -60,6 +60,27 @@ fn known_turns_have_known_figures() {
     near(evaluation.photographs[1].theta_error_deg.expect("rotations"), -3.0);
 }
 
+/// The first photograph's vertical is stated 0.3 degrees off, and that it leans by 7 where its lines are: compared are the verticals in its middle. The
+/// second states none.
+#[test]
+fn stated_verticals_are_compared_in_the_middle() {
+    let mut stitched = project([3.0, -1.0]);
+    let measured = |path: &str, lean: Option<f64>| {
+        serde_json::json!({"path": path, "vertical_lines": 4, "lean_deg": lean, "standard_error_deg": lean.map(|_| 0.1),
+            "within_deg": lean.map(|_| 0.2), "gamma_deg": 2.3, "certain": lean.is_some(), "lines": []})
+    };
+    let pictures = [measured("some/where\\b.jpg", None), measured("some/where\\a.jpg", Some(7.0))];
+    let measures = serde_json::json!({"upright": null, "estimated_gdic_deg": null, "reprojection": null, "long_lines": null, "ld": 0.0,
+        "ld_mean": 0.0, "folds": 0, "pictures": pictures});
+    stitched.measures = Some(serde_json::from_value(measures).expect("measures"));
+    let evaluation = evaluate(&stitched, &truth([2.0, 1.0])).expect("two photographs");
+    let error = evaluation.photographs[0].lean_error_deg.expect("stated");
+    assert!((error + 0.3).abs() < 1e-9, "{error}");
+    assert_eq!(evaluation.photographs[1].lean_error_deg, None);
+    let stated = evaluation.stated.expect("measures");
+    assert_eq!((stated.intervals, stated.holding), (1, 0));
+}
+
 fn complaint(project: &Project, truth: &Truth) -> String {
     evaluate(project, truth).expect_err("it does not fit").to_string()
 }
