@@ -63,12 +63,12 @@ const CONFIRMING_SIGNIFICANCE: f64 = 5.0;
 const MAX_CAMERA_ANGLE_DEG: f64 = 20.0;
 /// ... unless it is this few of the cameras' own deviations.
 const MAX_CAMERA_DEVIATIONS: f64 = 2.0;
-/// Largest angle of the same where photographs that all look up or down explain it, as two of a tower do: beyond, what lies level before the camera is as
-/// near, degrees.
-const MAX_STEEP_DEG: f64 = 45.0;
-/// Share of the divergence that is believed there: 2.8 times as many directions lie within 45 degrees of pitch and 20 of roll as within 20 of the vertical,
+/// Largest angle of the same where photographs that all look up or down explain it, as two of a tower do, degrees. Beyond, what lies level before the camera
+/// may be taken for the vertical: with pitches that scatter by 20 degrees (reasoned), that they look the other way, onto a floor, is more than an eighth as probable.
+const MAX_STEEP_DEG: f64 = 36.0;
+/// Share of the divergence that is believed there: 2.3 times as many directions lie within 36 degrees of pitch and 20 of roll as within 20 of the vertical,
 /// and the chance that unrelated triads meet falls with the cube of the angle, the divergence's power of 3/2.
-const STEEP_DIVERGENCE_SHARE: f64 = 0.5;
+const STEEP_DIVERGENCE_SHARE: f64 = 0.58;
 /// Largest median roll of the agreeing photographs, degrees.
 const MAX_MEDIAN_ROLL_DEG: f64 = 45.0;
 
@@ -176,9 +176,9 @@ mod tests {
             };
             failed_clause(&evidence, &SimilarityOptions::default()).is_some()
         };
-        assert!(!refused(0.0099, 30.0, Some(4.0)));
-        assert!(refused(0.0101, 30.0, Some(4.0)), "twice the directions lie there, and have to agree more closely");
-        assert!(refused(0.001, 46.0, Some(4.0)), "what lies level in front is as near");
+        assert!(!refused(0.0115, 30.0, Some(4.0)));
+        assert!(refused(0.0117, 30.0, Some(4.0)), "more directions lie there, and have to agree more closely");
+        assert!(refused(0.001, 37.0, Some(4.0)), "what lies level in front is as near");
         assert!(refused(0.001, 30.0, Some(21.0)), "the photographs would be rolled");
         assert!(refused(0.001, 30.0, None), "the cameras tell");
         assert!(!refused(0.019, 19.0, None));

@@ -168,7 +168,7 @@ fn the_gate_accepts_noisy_manhattan_scenes() {
 
 #[test]
 fn two_photographs_that_look_up_alike_are_guided() {
-    for pitch_base_deg in [-40.0, -25.0, 30.0] {
+    for pitch_base_deg in [-32.0, -25.0, 30.0] {
         let world = World::Manhattan { noise_deg: 0.5, bad_share: 0.0 };
         let scene = SyntheticScene::new(Sweep { count: 2, pitch_base_deg, ..Sweep::default() }, world, 0.2, 7);
         let prior = scene.prior(&paper());
