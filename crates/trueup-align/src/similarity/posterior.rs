@@ -11,7 +11,8 @@
 //! * Upright and level lines may tell of different verticals, each of them sure of its own, as where pavements drain. What is open
 //!   between them (see `witnesses`) is asked as well.
 //! * Each of the three estimates the same variance from a few groups, and is now too small, now too large. Their mean counts: the largest of three is
-//!   nearly always too large.
+//!   nearly always too large. Where photographs agree on nothing and the frame of all lines together guides, the largest does: what
+//!   one of them cannot see is to be expected there.
 //! * Plumb lines are not plumb, level ones not level, lenses and focal lengths a little different from what was found,
 //!   alike in all sectors: no comparison of sectors shows that.
 //! * The turns of single cameras have what segments and overlaps leave open of them.
@@ -93,10 +94,17 @@ pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRol
     let by_sectors = scatter(without_each_sector(&vote, refinement, *vertical), MIN_SECTORS)?;
     let by_photographs = scatter(without_some_photographs(&vote, refinement), MIN_GROUPS);
     let by_kinds = scene.spread.as_ref().and_then(Scatter::of_spread);
-    let scatter = Scatter::mean(by_sectors, by_photographs.into_iter().chain(by_kinds));
+    let others = by_photographs.into_iter().chain(by_kinds);
+    let scatters: Vec<Scatter> = match input.prior.guidance.pooled {
+        true => std::iter::once(by_sectors).chain(others).collect(),
+        false => vec![Scatter::mean(by_sectors, others)],
+    };
     let certainties = relative_certainties(&scene.cameras(input), input.edges);
     let turns = turn_covariances(&scene.rotations, &certainties, &vote, frame, axis_weights)?;
-    let estimate = |(rotation, turn): (&Matrix3<f64>, &Matrix3<f64>)| scatter.estimate(&down, rotation, turn);
+    let estimate = |(rotation, turn): (&Matrix3<f64>, &Matrix3<f64>)| {
+        let estimates = scatters.iter().filter_map(|scatter| scatter.estimate(&down, rotation, turn));
+        estimates.max_by(|one, other| one.within.total_cmp(&other.within))
+    };
     Some(scene.rotations.iter().zip(&turns).map(estimate).collect())
 }
 
@@ -191,16 +199,16 @@ impl Scatter {
         (groups >= fewest).then(|| Self { covariance: axis_covariance(frames, vertical), freedom: groups - 1 })
     }
 
-    /// That of a spread; `None` of fewer groups than tell anything. It is of the sectors, or photographs, that others are of, and adds no degrees of freedom.
+    /// That of a spread; `None` of fewer groups than tell anything. It is of the sectors, or photographs, that others are of.
     fn of_spread(spread: &VerticalSpread) -> Option<Self> {
         let covariance = matrix_from_rows(&spread.covariance);
-        (spread.groups >= MIN_GROUPS).then_some(Self { covariance, freedom: 0 })
+        (spread.groups >= MIN_GROUPS).then_some(Self { covariance, freedom: spread.groups - 1 })
     }
 
-    /// The mean of several estimates of one covariance, with the degrees of freedom of all.
+    /// The mean of several estimates of one covariance, with the most degrees of freedom of them: they are of the same lines.
     fn mean(first: Self, others: impl Iterator<Item = Self>) -> Self {
         let (sum, count) = others.fold((first, 1.0), |(sum, count), one| {
-            let freedom = sum.freedom + one.freedom;
+            let freedom = sum.freedom.max(one.freedom);
             (Self { covariance: sum.covariance + one.covariance, freedom }, count + 1.0)
         });
         Self { covariance: sum.covariance / count, ..sum }
@@ -263,12 +271,12 @@ mod tests {
         assert_eq!(Scatter::of(&[down(0.01, 0.0)], 1, 2), None);
     }
 
-    /// By hand: diagonals 1, 4, 7 come to 4; three and five degrees of freedom, and none of what is of the same groups.
+    /// By hand: diagonals 1, 4, 7 come to 4; of three, five and two degrees of freedom five count.
     #[test]
     fn estimates_of_one_scatter_are_averaged() {
         let of = |variance: f64, freedom| Scatter { covariance: Matrix3::identity() * variance, freedom };
-        let mean = Scatter::mean(of(1.0, 3), [of(4.0, 5), of(7.0, 0)].into_iter());
-        assert!((mean.covariance - Matrix3::identity() * 4.0).norm() < 1e-12 && mean.freedom == 8);
+        let mean = Scatter::mean(of(1.0, 3), [of(4.0, 5), of(7.0, 2)].into_iter());
+        assert!((mean.covariance - Matrix3::identity() * 4.0).norm() < 1e-12 && mean.freedom == 5);
         assert_eq!(Scatter::mean(of(1.0, 3), std::iter::empty()), of(1.0, 3));
     }
 
