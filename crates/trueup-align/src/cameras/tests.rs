@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 use rand::RngExt;
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z, wrap_angle};
 use trueup_core::lens::{Lens, LensProjection, LensTerms};
-use trueup_core::matches::{PairVerdict, PointMatch};
+use trueup_core::matches::{PairVerdict, PointMatch, PointMatches};
 use trueup_core::source::WorkingFrame;
 
 use super::bundle::BundleAdjustment;
@@ -72,7 +72,7 @@ pub(super) fn joined(a: usize, b: usize, inliers: Vec<PointMatch>) -> PairMatche
         verdict,
         b_from_a: None,
         inliers,
-        elsewhere: Vec::new(),
+        elsewhere: PointMatches::default(),
     }
 }
 

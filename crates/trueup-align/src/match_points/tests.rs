@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_y;
-use trueup_core::matches::{PairVerdict, PointMatch};
+use trueup_core::matches::{PairVerdict, PointMatch, PointMatches};
 
 use super::*;
 
@@ -39,7 +39,7 @@ fn example() -> (Vec<WorkingFrame>, Vec<Camera>, PairMatches) {
         a: 0,
         b: 1,
         putative: inliers.len(),
-        elsewhere: Vec::new(),
+        elsewhere: PointMatches::default(),
         in_overlap: inliers.len(),
         agreeing: inliers.len(),
         needed: 15,

@@ -1,6 +1,6 @@
 use rand::Rng;
 
-use trueup_core::matches::PairVerdict;
+use trueup_core::matches::{PairVerdict, PointMatches};
 use trueup_core::{Error, StageContext};
 
 use super::*;
@@ -43,8 +43,8 @@ fn matched((a, b): (usize, usize), joined: bool) -> PairMatches {
         needed: 15,
         verdict: if joined { PairVerdict::Joined } else { PairVerdict::TooFewInliers },
         b_from_a: joined.then_some([[1.0, 0.0, -shift], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
-        inliers: Vec::new(),
-        elsewhere: Vec::new(),
+        inliers: PointMatches::default(),
+        elsewhere: PointMatches::default(),
     }
 }
 
