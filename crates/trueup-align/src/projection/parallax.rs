@@ -150,7 +150,8 @@ impl<'a> Overlaps<'a> {
             })
             .collect();
         let cameras: Vec<Camera> = self.photographs.iter().map(|photograph| photograph.camera).collect();
-        smooth_steps(&cameras, &lattices, &meetings.concat())
+        let meetings: Vec<Meeting> = meetings.into_iter().flatten().collect();
+        smooth_steps(&cameras, &lattices, &meetings)
     }
 
     /// How another photograph sees the `place` that is expected in `direction`; `None` if it does not show it.
