@@ -176,7 +176,7 @@ pub(crate) fn joined(a: usize, b: usize, inliers: Vec<PointMatch>) -> PairMatche
         needed: 15,
         verdict: PairVerdict::Joined,
         b_from_a: None,
-        inliers,
+        inliers: inliers.into(),
         elsewhere: PointMatches::default(),
     }
 }

@@ -120,7 +120,7 @@ pub(super) fn matched(a: usize, b: usize, b_from_a: impl Fn(Vector2<f64>) -> Opt
         needed: 15,
         verdict: PairVerdict::Joined,
         b_from_a: None,
-        inliers,
+        inliers: inliers.into(),
         elsewhere: PointMatches::default(),
     }
 }
