@@ -10,7 +10,7 @@ use trueup_core::StageContext;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
 use trueup_core::lines::LineSegment;
-use trueup_core::matches::{PairMatches, PairVerdict};
+use trueup_core::matches::{PairMatches, PairVerdict, PointMatches};
 use trueup_core::source::WorkingFrame;
 
 const FRAME: WorkingFrame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 0.5 };
@@ -111,7 +111,7 @@ fn joined(a: usize, b: usize) -> PairMatches {
         needed: 15,
         verdict: PairVerdict::Joined,
         b_from_a: None,
-        inliers: Vec::new(),
-        elsewhere: Vec::new(),
+        inliers: PointMatches::default(),
+        elsewhere: PointMatches::default(),
     }
 }

@@ -53,6 +53,8 @@ impl Bars {
 
 impl Progress for Bars {
     fn begin(&self, stage: &str, total: u64) {
+        // What the stages before needed.
+        trueup_terminal::give_back();
         let mut stages = self.stages();
         // A stage that ran for an earlier panorama begins again: a comparison would fill the screen with bars.
         if let Some((_, bar)) = stages.iter().find(|(name, _)| name == stage) {

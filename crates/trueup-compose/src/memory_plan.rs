@@ -17,7 +17,8 @@ use crate::store::{CanvasBlocks, Pixel, PixelStore, SumPixel};
 pub struct Resources<'a> {
     /// Bytes of memory for the photographs, the canvas and all that is made on the way.
     pub memory: usize,
-    /// Bytes that may be taken where `memory` is too little to compose at all; `memory` itself if that is the user's word.
+    /// Bytes that may be taken where `memory` is too little to compose at all; `memory` itself if that is the user's word and the program takes no
+    /// more beside than it is counted with.
     pub ceiling: usize,
     /// Where the canvas goes if it does not fit.
     pub scratch: &'a dyn ScratchSpace,
@@ -56,6 +57,8 @@ pub(crate) struct MemoryPlan {
     pub(crate) coarse_levels: Option<SpillPlace>,
     /// Bytes of decoded photographs that may be held beside those that are being decoded.
     pub(crate) photographs: usize,
+    /// The same where one place shows so many that fewer will not do.
+    pub(crate) most_photographs: usize,
     /// Photographs decoded at once.
     pub(crate) at_a_time: usize,
     /// Bytes of the canvas that may be summed up at once, where photographs are averaged.
@@ -111,10 +114,12 @@ impl MemoryPlan {
             file.write_at(&[0], on_disk - 1)?;
         }
         let place = file.clone().map(|file| SpillPlace { file, offset: on_disk });
+        let photographs = needs.at_one_place.saturating_add(left);
         Ok(Self {
             coarse_levels: place.filter(|_| !hold_levels),
             file: file.filter(|_| !in_memory),
-            photographs: needs.at_one_place.saturating_add(left),
+            photographs,
+            most_photographs: photographs.saturating_add(resources.ceiling.saturating_sub(memory)),
             at_a_time: 1 + more,
             sums,
         })

@@ -1,6 +1,9 @@
 //! What is known of a pair of photographs after matching.
 
-use serde::{Deserialize, Serialize};
+use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// A point seen in both photographs of a pair, in working pixels of each.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -9,6 +12,59 @@ pub struct PointMatch {
     pub in_a: [f64; 2],
     /// Position in photograph b (x, y).
     pub in_b: [f64; 2],
+}
+
+/// Matches that copies share: pairs are handed from stage to stage, renumbered and chosen among, and their matches stay what they are.
+/// Whoever changes a copy has it to itself from then on.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PointMatches(Arc<Vec<PointMatch>>);
+
+impl Deref for PointMatches {
+    type Target = Vec<PointMatch>;
+
+    fn deref(&self) -> &Vec<PointMatch> {
+        &self.0
+    }
+}
+
+impl DerefMut for PointMatches {
+    fn deref_mut(&mut self) -> &mut Vec<PointMatch> {
+        Arc::make_mut(&mut self.0)
+    }
+}
+
+impl From<Vec<PointMatch>> for PointMatches {
+    fn from(mut matches: Vec<PointMatch>) -> Self {
+        matches.shrink_to_fit();
+        Self(Arc::new(matches))
+    }
+}
+
+impl FromIterator<PointMatch> for PointMatches {
+    fn from_iter<I: IntoIterator<Item = PointMatch>>(matches: I) -> Self {
+        matches.into_iter().collect::<Vec<_>>().into()
+    }
+}
+
+impl<'a> IntoIterator for &'a PointMatches {
+    type Item = &'a PointMatch;
+    type IntoIter = std::slice::Iter<'a, PointMatch>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.iter()
+    }
+}
+
+impl Serialize for PointMatches {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for PointMatches {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Vec::deserialize(deserializer).map(Self::from)
+    }
 }
 
 /// Why a pair was accepted or not.
@@ -54,10 +110,10 @@ pub struct PairMatches {
     /// Rows of the homography from a to b in working pixels; `None` if none was found.
     pub b_from_a: Option<[[f64; 3]; 3]>,
     /// The matches kept (P_ij): global inliers first, then those of further planes. Empty unless joined.
-    pub inliers: Vec<PointMatch>,
+    pub inliers: PointMatches,
     /// Further matches of which neighbors moved alike and that, with the others, one epipolar geometry explains: the same things, elsewhere in
     /// depth than the planes that `inliers` lie on. Empty unless joined.
-    pub elsewhere: Vec<PointMatch>,
+    pub elsewhere: PointMatches,
 }
 
 impl PairMatches {

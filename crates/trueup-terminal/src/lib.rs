@@ -14,7 +14,7 @@ use trueup_core::context::CancelToken;
 use request::StopRequest;
 
 pub use complaint::complain;
-pub use memory::{NotingAllocator, WithoutMemory, end_without_memory};
+pub use memory::{NotingAllocator, WithoutMemory, end_without_memory, give_back};
 pub use request::{LastResort, status_of_stopping};
 
 /// A token that the first request to stop cancels, to be asked for once in a program; `said` is then printed on standard

@@ -4,9 +4,12 @@
 use std::io::ErrorKind;
 
 use serde::de::DeserializeOwned;
+use trueup_align::projection::ParallaxShift;
+use trueup_compose::exposure::Corrections;
 use trueup_core::diagnostics::Reported;
 use trueup_core::matches::PairMatches;
 use trueup_vision::pairing::Likeness;
+use trueup_vision::stacks::FoundStack;
 
 use crate::memo::{checked_content, entry_with_content};
 use crate::pipeline::align::Geometry;
@@ -25,6 +28,9 @@ pub fn read_cache_content(content: &[u8]) {
     read_as::<PairMatches>(content);
     read_as::<Likeness>(content);
     read_as::<Reported<Geometry>>(content);
+    read_as::<Vec<FoundStack>>(content);
+    read_as::<Vec<ParallaxShift>>(content);
+    read_as::<Reported<Corrections>>(content);
 }
 
 fn read_as<T: DeserializeOwned>(content: &[u8]) {

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 use rand::RngExt;
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z, wrap_angle};
 use trueup_core::lens::{Lens, LensProjection, LensTerms};
-use trueup_core::matches::{PairVerdict, PointMatch};
+use trueup_core::matches::{PairVerdict, PointMatch, PointMatches};
 use trueup_core::source::WorkingFrame;
 
 use super::bundle::BundleAdjustment;
@@ -71,8 +71,8 @@ pub(super) fn joined(a: usize, b: usize, inliers: Vec<PointMatch>) -> PairMatche
         needed: 15,
         verdict,
         b_from_a: None,
-        inliers,
-        elsewhere: Vec::new(),
+        inliers: inliers.into(),
+        elsewhere: PointMatches::default(),
     }
 }
 
@@ -244,7 +244,7 @@ fn an_absurd_start_or_a_pure_shift_never_ends_the_run() {
         .collect();
     let truth = [camera(700.0, 0.0, 0.0, 0.0), camera(700.0, 20.0, 0.0, 0.0)];
     let mut pairs = matched(&truth, 0.0, 0.0);
-    pairs[0].inliers = shift;
+    pairs[0].inliers = shift.into();
     for known in [None, Some(1e9), Some(1e-9), Some(f64::NAN)] {
         let cameras = estimate(&pairs, known, &[0; 2]);
         assert!(cameras.cameras.iter().all(|camera| camera.focal_px.is_finite() && camera.focal_px > 0.0));
@@ -257,7 +257,7 @@ fn a_pair_that_contradicts_the_rest_is_set_aside() {
     let truth: Vec<Camera> = (0..4).map(|k| camera(700.0, 15.0 * f64::from(k), 0.0, 0.0)).collect();
     let mut pairs = matched(&truth, 0.3, 0.0);
     let wrong = pairs.iter().position(|pair| pair.a == 0 && pair.b == 2).expect("overlap");
-    for one in &mut pairs[wrong].inliers {
+    for one in pairs[wrong].inliers.iter_mut() {
         one.in_b[0] += 70.0;
     }
     pairs[wrong].inliers.truncate(30);

@@ -33,7 +33,7 @@ fn a_pair_has_the_lens_that_was_told() {
 #[test]
 fn a_told_field_of_view_holds_where_the_matches_tell_none() {
     let mut pairs = matched(&[camera(700.0, 0.0, 0.0, 0.0), camera(700.0, 20.0, 0.0, 0.0)], 0.0, 0.0);
-    for one in &mut pairs[0].inliers {
+    for one in pairs[0].inliers.iter_mut() {
         one.in_b = [one.in_a[0] - 250.0, one.in_a[1]];
     }
     let options = CameraOptions { fov: 60.0, ..CameraOptions::default() };

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_y;
-use trueup_core::matches::{PairVerdict, PointMatch};
+use trueup_core::matches::{PairVerdict, PointMatch, PointMatches};
 
 use super::*;
 
@@ -39,13 +39,13 @@ fn example() -> (Vec<WorkingFrame>, Vec<Camera>, PairMatches) {
         a: 0,
         b: 1,
         putative: inliers.len(),
-        elsewhere: Vec::new(),
+        elsewhere: PointMatches::default(),
         in_overlap: inliers.len(),
         agreeing: inliers.len(),
         needed: 15,
         verdict: PairVerdict::Joined,
         b_from_a: Some(homography.to_rows()),
-        inliers,
+        inliers: inliers.into(),
     };
     (vec![frame, frame], cameras, pair)
 }
@@ -103,8 +103,8 @@ fn beyond_cameras(pair: PairMatches) -> Vec<Vector2<f64>> {
 fn vertices_follow_the_few_matches_of_a_plane_that_the_cameras_miss() {
     const SHIFT: Vector2<f64> = Vector2::new(6.0, 2.0);
     let (_, cameras, mut pair) = example();
-    pair.inliers = pair.inliers.into_iter().step_by(9).collect();
-    for one in &mut pair.inliers {
+    pair.inliers = pair.inliers.iter().copied().step_by(9).collect();
+    for one in pair.inliers.iter_mut() {
         one.in_b = (Vector2::from(one.in_b) + SHIFT).into();
     }
     let (source, target) = ends(&pair);
@@ -123,7 +123,7 @@ fn vertices_follow_the_few_matches_of_a_plane_that_the_cameras_miss() {
 fn a_smaller_parallax_is_followed_in_part() {
     const SHIFT: Vector2<f64> = Vector2::new(0.35, 0.35);
     let (_, cameras, mut pair) = example();
-    for one in &mut pair.inliers {
+    for one in pair.inliers.iter_mut() {
         one.in_b = (Vector2::from(one.in_b) + SHIFT).into();
     }
     let (source, target) = ends(&pair);
@@ -177,7 +177,7 @@ fn noise_of_matches_is_no_parallax() {
 #[test]
 fn without_a_homography_the_cameras_carry() {
     let (_, _, mut pair) = example();
-    for one in &mut pair.inliers {
+    for one in pair.inliers.iter_mut() {
         one.in_b[0] += 6.0;
     }
     pair.b_from_a = None;

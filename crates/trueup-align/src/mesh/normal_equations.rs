@@ -1,7 +1,5 @@
 //! Normal equations of the mesh, assembled block by block.
 
-use faer::c64;
-use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
@@ -64,6 +62,15 @@ pub(super) struct NormalEquations {
     inside: Vec<[Block; SLOTS]>,
     /// For every vertex its couplings with earlier ones that are not in the tables.
     between: Vec<Couplings>,
+    pub right: Vec<f64>,
+    pub border: Option<Border>,
+}
+
+/// What [`NormalEquations`] come to: all that solving them takes, in a fifth of the memory.
+#[derive(Debug)]
+pub(super) struct AssembledEquations {
+    /// As [`NormalEquations::blocks`] has them.
+    pub blocks: Vec<PlacedBlock>,
     pub right: Vec<f64>,
     pub border: Option<Border>,
 }
@@ -275,19 +282,6 @@ impl NormalEquations {
         self.add_block_inside(one.photograph, high, low, block.map(|entry| times * entry));
     }
 
-    /// The grids with the solution as their targets.
-    pub(super) fn meshes(&self, grids: &[GridMesh], solution: &[f64]) -> Vec<GridMesh> {
-        grids
-            .iter()
-            .enumerate()
-            .map(|(photograph, grid)| {
-                let first = self.first[photograph];
-                let target = (first..first + grid.len()).map(|v| [solution[2 * v], solution[2 * v + 1]]).collect();
-                GridMesh { target, ..grid.clone() }
-            })
-            .collect()
-    }
-
     /// Adds a block for two vertices, numbered through all grids, to the list of the later one, whose row it is.
     fn couple(&mut self, one: usize, other: usize, block: Block) {
         self.between[one.max(other)].add(one.min(other) as u32, block);
@@ -330,51 +324,21 @@ impl NormalEquations {
         by_column(&blocks, self.inside.len())
     }
 
-    /// The lower triangle as a sparse matrix, of its [`Self::blocks`].
-    pub(super) fn matrix(&self, blocks: &[PlacedBlock]) -> Option<SparseColMat<usize, f64>> {
-        let unknowns = self.unknowns();
-        let mut column_starts = Vec::with_capacity(unknowns + 1);
-        let mut rows = Vec::with_capacity(4 * blocks.len());
-        let mut values = Vec::with_capacity(4 * blocks.len());
-        column_starts.push(0);
-        for group in blocks.chunk_by(|one, other| one.1 == other.1) {
-            for side in 0..2 {
-                for &(row, column, block) in group {
-                    let row = row as usize;
-                    if row != column as usize || side == 0 {
-                        rows.push(2 * row);
-                        values.push(block[side]);
-                    }
-                    rows.push(2 * row + 1);
-                    values.push(block[2 + side]);
-                }
-                column_starts.push(rows.len());
-            }
-        }
-        // Every vertex has at least its own block, so that no column is skipped.
-        (column_starts.len() == unknowns + 1).then(|| {
-            let pattern = SymbolicSparseColMat::new_checked(unknowns, unknowns, column_starts, None, rows);
-            SparseColMat::new(pattern, values)
-        })
+    /// The equations without the tables that they were added up in.
+    pub(super) fn assembled(self) -> AssembledEquations {
+        AssembledEquations { blocks: self.blocks(), right: self.right, border: self.border }
     }
+}
 
-    /// The same matrix in x + i y of the vertices, where all of its [`Self::blocks`] turn and scale alone.
-    pub(super) fn complex_matrix(&self, blocks: &[PlacedBlock]) -> Option<SparseColMat<usize, c64>> {
-        let vertices = self.inside.len();
-        let mut column_starts = Vec::with_capacity(vertices + 1);
-        column_starts.push(0);
-        let groups = blocks.chunk_by(|one, other| one.1 == other.1);
-        column_starts.extend(groups.scan(0, |end, group| {
-            *end += group.len();
-            Some(*end)
-        }));
-        let rows = blocks.iter().map(|&(row, _, _)| row as usize).collect();
-        let values = blocks.iter().map(|&(_, _, [cosine, _, sine, _])| c64::new(cosine, sine)).collect();
-        (column_starts.len() == vertices + 1).then(|| {
-            let pattern = SymbolicSparseColMat::new_checked(vertices, vertices, column_starts, None, rows);
-            SparseColMat::new(pattern, values)
-        })
-    }
+/// The `grids` with a solution, x and y of all of their vertices in turn, as their targets.
+pub(super) fn solved_grids(grids: &[GridMesh], solution: &[f64]) -> Vec<GridMesh> {
+    let (mut places, _) = solution.as_chunks::<2>();
+    let mut of_grid = |grid: &GridMesh| {
+        let (own, rest) = places.split_at(grid.len());
+        places = rest;
+        GridMesh { target: own.to_vec(), ..grid.clone() }
+    };
+    grids.iter().map(&mut of_grid).collect()
 }
 
 /// Blocks in the order of their columns, in their given order within a column (counting sort). They are listed by rising

@@ -60,13 +60,21 @@ impl<'a> Layout<'a> {
     }
 }
 
+/// The equations of the mesh of `input`, whose `problem` it is.
+fn plain_equations(input: &MeshInput, problem: &MeshProblem) -> NormalEquations {
+    let mut equations = problem.equations();
+    if let Some(structure) = &input.structure {
+        structure.add(&mut equations, &problem.current(input.grids, input.grids));
+    }
+    equations
+}
+
 /// A mesh without refinements, and all that these go on from.
 #[derive(Debug)]
 pub struct PlainMesh<'a> {
     input: MeshInput<'a>,
     layout: Layout<'a>,
     options: &'a MeshOptions,
-    equations: NormalEquations,
     solved: Solved,
     warped: WarpedMesh,
 }
@@ -80,14 +88,10 @@ impl<'a> PlainMesh<'a> {
         context: &StageContext,
     ) -> Result<Self> {
         let problem = layout.problem(&input, options, context);
-        let mut equations = problem.equations();
-        if let Some(structure) = &input.structure {
-            structure.add(&mut equations, &problem.current(input.grids, input.grids));
-        }
-        // Its factor is not kept for refinements: it is the largest thing there is while it is asked whether the cameras draw.
-        let solved = problem.solve(&mut MeshSolver::default(), &equations)?;
+        // Equations and factor are not kept for refinements: they are the largest things there are while it is asked whether the cameras draw.
+        let solved = problem.solve(&mut MeshSolver::default(), plain_equations(&input, &problem))?;
         let warped = problem.warped(&solved);
-        Ok(Self { input, layout, options, equations, solved, warped })
+        Ok(Self { input, layout, options, solved, warped })
     }
 
     /// What the cameras draw, to be refined: the bases of `input` are the drawing, less the first vertex of the reference.
@@ -101,8 +105,8 @@ impl<'a> PlainMesh<'a> {
         let solved = Solved { meshes: placed(grids, &places), period: None, relative_gradient: 0.0 };
         let layout = Layout::new(&input, places, alignment, &[], options);
         let problem = layout.problem(&input, options, context);
-        let (equations, warped) = (problem.equations(), problem.warped(&solved));
-        Self { input, layout, options, equations, solved, warped }
+        let warped = problem.warped(&solved);
+        Self { input, layout, options, solved, warped }
     }
 
     /// The grids, as they are delivered if nothing refines them.
@@ -133,9 +137,10 @@ impl<'a> PlainMesh<'a> {
     /// As those of [`run`](super::run); [`trueup_core::Error::Input`] if a refinement's lists do not have an entry per
     /// photograph.
     pub fn refined(self, refinements: &Refinements, context: &StageContext) -> Result<WarpedMesh> {
-        let Self { input, layout, options, equations, solved, .. } = self;
+        let Self { input, layout, options, solved, .. } = self;
         refinements.check(input.grids.len())?;
         let problem = layout.problem(&input, options, context);
+        let equations = plain_equations(&input, &problem);
         Ok(problem.warped(&problem.refine(&mut MeshSolver::of_rounds(), equations, solved, refinements)?))
     }
 }

@@ -5,7 +5,7 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result, StageContext};
 
 use super::alignment::AlignmentEnergy;
-use super::normal_equations::NormalEquations;
+use super::normal_equations::{NormalEquations, solved_grids};
 use super::options::MeshOptions;
 use super::similarity::SimilarityEnergy;
 use super::solver::MeshSolver;
@@ -70,7 +70,7 @@ impl MeshProblem<'_> {
         WarpedMesh { meshes, alignment_rms, folds, relative_gradient, period, by_cameras: None }
     }
 
-    pub(super) fn solve(&self, solver: &mut MeshSolver, equations: &NormalEquations) -> Result<Solved> {
+    pub(super) fn solve(&self, solver: &mut MeshSolver, equations: NormalEquations) -> Result<Solved> {
         self.context.check_cancelled()?;
         let unsolvable = |why: &str| {
             Error::unsolvable(
@@ -84,7 +84,7 @@ impl MeshProblem<'_> {
         if !solution.coordinates.iter().all(|coordinate| coordinate.is_finite()) {
             return Err(unsolvable("the solution is not finite"));
         }
-        let meshes = equations.meshes(self.grids, &solution.coordinates);
+        let meshes = solved_grids(self.grids, &solution.coordinates);
         let period = solution.period;
         if period.is_some_and(|period| !(period.is_finite() && period > 0.0)) {
             return Err(unsolvable("the length of a full turn is not positive"));

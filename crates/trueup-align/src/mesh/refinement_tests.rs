@@ -340,14 +340,14 @@ fn the_matched_lines_equations_are_the_gradient_of_their_energy() {
     }
     let cells = input.cells(&current, &input.whole_shares(), 2.0);
     cells.iter().for_each(|cells| equations.add_cell_pairs(cells));
-    let matrix = equations.matrix(&equations.blocks()).expect("every vertex has a block");
     let x: Vec<f64> = meshes.iter().flat_map(|mesh| mesh.target.iter().flatten().copied()).collect();
     let mut gradient: Vec<f64> = equations.right.iter().zip(&x).map(|(right, x)| -2.0 * (right + x)).collect();
-    for column in 0..x.len() {
-        for (row, &value) in matrix.row_idx_of_col(column).zip(matrix.val_of_col(column)) {
-            gradient[row] += 2.0 * value * x[column];
+    for (row, column, block) in equations.blocks() {
+        for (k, value) in block.into_iter().enumerate() {
+            let [row_unknown, column_unknown] = [2 * row as usize + k / 2, 2 * column as usize + k % 2];
+            gradient[row_unknown] += 2.0 * value * x[column_unknown];
             if row != column {
-                gradient[column] += 2.0 * value * x[row];
+                gradient[column_unknown] += 2.0 * value * x[row_unknown];
             }
         }
     }
@@ -408,7 +408,7 @@ fn aligned_believing_all(grids: &[GridMesh], warps: &[OverlapWarp], input: &Phot
     let layout = Layout::new(&mesh_input, places, alignment, &[], &options);
     let problem = layout.problem(&mesh_input, &options, &context);
     let (mut solver, mut equations) = (solver::MeshSolver::default(), problem.equations());
-    let plain = problem.solve(&mut solver, &equations).expect("solvable");
+    let plain = problem.solve(&mut solver, equations.clone()).expect("solvable");
     problem.hold_outlines(&mut equations, &plain.meshes, 1.0);
     let whole = rounds::PixelAlignment { input, shares: &[1.0], straight: None };
     let aligned = problem.align_pixels(&mut solver, &equations, &whole, plain).expect("solvable");

@@ -77,7 +77,7 @@ impl MeshProblem<'_> {
             let lines = input.cells(&self.current(&best.meshes, &fine), &shares, robust_px);
             lines.iter().for_each(|cells| all.add_cell_pairs(cells));
             robust_px *= NARROWING;
-            let next = self.solve(solver, &all)?;
+            let next = self.solve(solver, all)?;
             let Some(step) = self.longest_step(&best, next, |_, fine| total_folds(fine) <= folds) else { continue };
             (best, fine) = step;
             last = lines;
@@ -135,7 +135,7 @@ impl MeshProblem<'_> {
                     break;
                 }
                 before = misfit;
-                let next = self.solve(solver, &with_pixels)?;
+                let next = self.solve(solver, with_pixels)?;
                 let most_rms = self.alignment.rms(&best.meshes, best.period) + MAX_DEPARTURE_PX;
                 let is_sound = |step: &Solved, fine: &[GridMesh]| {
                     total_folds(fine) <= folds && self.alignment.rms(&step.meshes, step.period) <= most_rms

@@ -15,7 +15,7 @@ use trueup_core::mesh::GridMesh;
 use super::by_cameras::carried;
 use super::complex::product;
 use super::metric::Metric;
-use super::normal_equations::{CarriedVertex, NormalEquations, WeightedVertex};
+use super::normal_equations::{CarriedVertex, NormalEquations, WeightedVertex, solved_grids};
 use super::solver::MeshSolver;
 
 /// A vertex of one photograph's lattice and the place in another that shows the same.
@@ -61,18 +61,18 @@ pub(crate) fn smooth_steps(cameras: &[Camera], lattices: &[GridMesh], meetings: 
     }
     let still = |grid: &GridMesh| GridMesh { target: vec![[0.0; 2]; grid.len()], ..grid.clone() };
     let mut steps: Vec<GridMesh> = lattices.iter().map(still).collect();
-    let shape = shape_energy(cameras, lattices, &asides(lattices, meetings));
+    let asides = asides(lattices, meetings);
     let mut solver = MeshSolver::default();
     for _ in 0..ROUNDS {
-        let mut equations = shape.clone();
+        let mut equations = shape_energy(cameras, lattices, &asides);
         for meeting in meetings {
             add_meeting(meeting, cameras, &steps, &mut equations);
         }
-        let solution = solver.solve(&equations)?;
+        let solution = solver.solve(equations)?;
         if !solution.coordinates.iter().all(|coordinate| coordinate.is_finite()) {
             return None;
         }
-        steps = equations.meshes(lattices, &solution.coordinates);
+        steps = solved_grids(lattices, &solution.coordinates);
     }
     Some(steps)
 }

@@ -1,7 +1,7 @@
 //! Sparse Cholesky whose factor serves several solves.
 
 use super::factor::VertexFactor;
-use super::normal_equations::{Border, NormalEquations, PlacedBlock};
+use super::normal_equations::{AssembledEquations, Border, NormalEquations, PlacedBlock};
 
 /// What [`MeshSolver::solve`] finds.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,23 +37,24 @@ impl MeshSolver {
     }
 
     /// The least-squares solution; `None` if the matrix is not positive definite.
-    pub(super) fn solve(&mut self, equations: &NormalEquations) -> Option<MeshSolution> {
-        let blocks = equations.blocks();
-        let border = equations.border.as_ref();
+    pub(super) fn solve(&mut self, equations: NormalEquations) -> Option<MeshSolution> {
+        let AssembledEquations { blocks, right, border } = equations.assembled();
+        let border = border.as_ref();
         let system = System { blocks: &blocks, border };
-        let right = Bordered { inner: column(&equations.right), last: border.map_or(0.0, |border| border.right) };
+        let right = Bordered { inner: column(&right), last: border.map_or(0.0, |border| border.right) };
         let known = self.last.take().and_then(|(factor, solution)| {
-            let solution = conjugate_gradients(&system, &right, &factor, solution, self.unmet_share)?;
+            let goal = Goal { met_px: MET_PX, unmet_share: self.unmet_share };
+            let solution = conjugate_gradients(&system, &right, &factor, solution, goal)?;
             Some((factor, solution))
         });
         let (factor, solution) = match known {
             Some(known) => known,
-            None => solve_directly(equations, &system, &right)?,
+            None => solve_directly(&system, &right)?,
         };
         let residual = system.residual(&right, &solution);
         let found = MeshSolution {
             relative_gradient: residual.norm() / right.norm().max(f64::MIN_POSITIVE),
-            coordinates: (0..equations.unknowns()).map(|row| solution.inner[(row, 0)]).collect(),
+            coordinates: solution.inner.col_as_slice(0).to_vec(),
             period: border.map(|_| solution.last),
         };
         self.last = Some((factor, solution));
@@ -61,9 +62,22 @@ impl MeshSolver {
     }
 }
 
-fn solve_directly(equations: &NormalEquations, system: &System, right: &Bordered) -> Option<(Factor, Bordered)> {
-    let inner = VertexFactor::new(equations, system.blocks)?;
-    let factor = Factor::new(inner, system.border)?;
+/// The factor of the system and its solution, to rounding.
+fn solve_directly(system: &System, right: &Bordered) -> Option<(Factor, Bordered)> {
+    let vertices = right.inner.nrows() / 2;
+    let factor = VertexFactor::new(vertices, system.blocks).and_then(|inner| Factor::new(inner, system.border));
+    let factor = match factor {
+        Some(factor) if factor.inner.is_single() => {
+            let zero = Bordered { inner: faer::Mat::zeros(right.inner.nrows(), 1), last: 0.0 };
+            if let Some(solution) = conjugate_gradients(system, right, &factor, zero, TO_ROUNDING) {
+                return Some((factor, solution));
+            }
+            None
+        }
+        precise => precise,
+    };
+    let in_double = || Factor::new(VertexFactor::in_double_precision(vertices, system.blocks)?, system.border);
+    let factor = factor.or_else(in_double)?;
     let mut solution = factor.solve(right);
     // One step of refinement recovers the digits that the normal equations lose.
     solution.add(1.0, &factor.solve(&system.residual(right, &solution)));
@@ -163,8 +177,21 @@ impl Factor {
 /// known to a few tenths of a unit, and the next round starts from better equations.
 const MET_PX: f64 = 1e-3;
 
+/// How near conjugate gradients are to come to the solution.
+#[derive(Debug, Clone, Copy)]
+struct Goal {
+    /// A step that moves no vertex by more than this is the last, panorama units.
+    met_px: f64,
+    /// Nor one that is no larger than this share of the first.
+    unmet_share: f64,
+}
+
+/// As near as a factor in double precision comes: steps of a hundred-millionth of a pixel, which on panoramas of a million units are in the last
+/// digits.
+const TO_ROUNDING: Goal = Goal { met_px: 1e-8, unmet_share: 0.0 };
+
 /// The solution of `system` by conjugate gradients from `start`, preconditioned with the factor of a matrix like its
-/// own, but for `unmet_share` of the way to it or [`MET_PX`]; `None` if that takes longer than a factorization.
+/// own, but for what the `goal` leaves undone; `None` if that takes longer than a factorization.
 ///
 /// The preconditioned residual is what the factor's own matrix would still have to be moved by: it says in the unit of the
 /// unknowns how far the solution is.
@@ -177,7 +204,7 @@ fn conjugate_gradients(
     right: &Bordered,
     factor: &Factor,
     start: Bordered,
-    unmet_share: f64,
+    goal: Goal,
 ) -> Option<Bordered> {
     /// Steps that take about half as long as a factorization: of the mesh of five photographs, one takes a thirtieth.
     const MAX_STEPS: usize = 16;
@@ -190,7 +217,7 @@ fn conjugate_gradients(
     let mut residual = system.residual(right, &solution);
     let mut next = factor.solve(&residual);
     let first = next.largest();
-    let met = MET_PX.max(unmet_share * first);
+    let met = goal.met_px.max(goal.unmet_share * first);
     let mut direction = next.clone();
     let mut slope = residual.dot(&next);
     for step in 0..=MAX_STEPS {
@@ -288,13 +315,32 @@ mod tests {
     fn equations_like_those_before_have_the_solution_that_a_factorization_finds() {
         for with_period in [false, true] {
             let mut solver = MeshSolver::default();
-            solver.solve(&equations(|_| 0.5, with_period)).expect("solvable");
+            solver.solve(equations(|_| 0.5, with_period)).expect("solvable");
             let changed = equations(|vertex| 0.5 + 0.02 * (vertex % 3) as f64, with_period);
-            let again = solver.solve(&changed).expect("solvable");
-            let anew = MeshSolver::default().solve(&changed).expect("solvable");
+            let again = solver.solve(changed.clone()).expect("solvable");
+            let anew = MeshSolver::default().solve(changed).expect("solvable");
             assert!(farthest(&again, &anew) < MET_PX, "{}", farthest(&again, &anew));
             assert!(again.relative_gradient < 1e-5 && anew.relative_gradient < 1e-11);
             assert_eq!(again.period.is_some(), with_period);
+        }
+    }
+
+    /// What the large factors of many photographs are in: the solution does not depend on it.
+    #[test]
+    fn a_factor_in_single_precision_leads_to_the_same_solution() {
+        for with_period in [false, true] {
+            let equations = equations(|vertex| 0.05 + 0.02 * (vertex % 3) as f64, with_period);
+            let AssembledEquations { blocks, right, border } = equations.assembled();
+            let system = System { blocks: &blocks, border: border.as_ref() };
+            let right = Bordered { inner: column(&right), last: border.as_ref().map_or(0.0, |border| border.right) };
+            let (vertices, zero) = (right.inner.nrows() / 2, faer::Mat::zeros(right.inner.nrows(), 1));
+            let single = VertexFactor::of_precision(vertices, &blocks, 0).expect("positive definite");
+            let factor = Factor::new(single, border.as_ref()).expect("positive definite");
+            let start = Bordered { inner: zero, last: 0.0 };
+            let found = conjugate_gradients(&system, &right, &factor, start, TO_ROUNDING).expect("solved");
+            let (_, mut apart) = solve_directly(&system, &right).expect("solved");
+            apart.add(-1.0, &found);
+            assert!(apart.largest() < 1e-7, "{}", apart.largest());
         }
     }
 
@@ -303,22 +349,23 @@ mod tests {
         let (near, far) = (equations(|_| 0.5, false), equations(|vertex| 10.0_f64.powi((vertex % 5) as i32), false));
         let (near_blocks, far_blocks) = (near.blocks(), far.blocks());
         let mut solver = MeshSolver::default();
-        solver.solve(&near).expect("solvable");
+        solver.solve(near.clone()).expect("solvable");
         let (factor, start) = solver.last.take().expect("solved");
         let right = Bordered { inner: column(&far.right), last: 0.0 };
+        let goal = Goal { met_px: MET_PX, unmet_share: 0.0 };
         let system = System { blocks: &far_blocks, border: None };
-        assert!(conjugate_gradients(&system, &right, &factor, start.clone(), 0.0).is_none());
+        assert!(conjugate_gradients(&system, &right, &factor, start.clone(), goal).is_none());
         // With its own matrix one step is enough.
         let system = System { blocks: &near_blocks, border: None };
         let right = Bordered { inner: column(&near.right), last: 0.0 };
         let zero = Bordered { inner: column(&vec![0.0; near.unknowns()]), last: 0.0 };
-        let found = conjugate_gradients(&system, &right, &factor, zero, 0.0).expect("solved");
+        let found = conjugate_gradients(&system, &right, &factor, zero, goal).expect("solved");
         let apart: f64 = (0..near.unknowns()).map(|row| (found.inner[(row, 0)] - start.inner[(row, 0)]).abs()).sum();
         assert!(apart < 1e-9, "{apart}");
         // The solver then factorizes.
         solver.last = Some((factor, start));
         let (again, anew) =
-            (solver.solve(&far).expect("solvable"), MeshSolver::default().solve(&far).expect("solvable"));
+            (solver.solve(far.clone()).expect("solvable"), MeshSolver::default().solve(far).expect("solvable"));
         assert!(farthest(&again, &anew) < 1e-9, "{}", farthest(&again, &anew));
     }
 }

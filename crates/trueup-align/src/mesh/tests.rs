@@ -54,7 +54,7 @@ fn run_evenly(grids: &[GridMesh], warps: &[OverlapWarp], bases: &[BaseMap], refe
     let input = MeshInput { grids, warps, bases, reference, closure: None, structure: None };
     let layout = Layout::new(&input, places, alignment, &[], &options);
     let problem = MeshProblem { prior_slope: 0.0, ..layout.problem(&input, &options, &context) };
-    let solved = problem.solve(&mut MeshSolver::default(), &problem.equations()).expect("solvable");
+    let solved = problem.solve(&mut MeshSolver::default(), problem.equations()).expect("solvable");
     problem.warped(&solved)
 }
 

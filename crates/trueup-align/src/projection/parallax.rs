@@ -18,6 +18,7 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::mesh::GridMesh;
 
@@ -26,10 +27,23 @@ use super::photograph::PosedPhotograph;
 use crate::mesh::{LATTICE_CELLS, Meeting, coarsening, smooth_steps, tilt_from_level};
 
 /// By how many of its own pixels each vertex of a photograph's grid looks aside, row-major.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(from = "Vec<[f64; 2]>", into = "Vec<[f64; 2]>")]
 pub struct ParallaxShift {
     /// One for each vertex; bilinear between.
     pub aside: Vec<Vector2<f64>>,
+}
+
+impl From<Vec<[f64; 2]>> for ParallaxShift {
+    fn from(aside: Vec<[f64; 2]>) -> Self {
+        Self { aside: aside.into_iter().map(Vector2::from).collect() }
+    }
+}
+
+impl From<ParallaxShift> for Vec<[f64; 2]> {
+    fn from(shift: ParallaxShift) -> Self {
+        shift.aside.into_iter().map(<[f64; 2]>::from).collect()
+    }
 }
 
 impl ParallaxShift {
@@ -136,7 +150,8 @@ impl<'a> Overlaps<'a> {
             })
             .collect();
         let cameras: Vec<Camera> = self.photographs.iter().map(|photograph| photograph.camera).collect();
-        smooth_steps(&cameras, &lattices, &meetings.concat())
+        let meetings: Vec<Meeting> = meetings.into_iter().flatten().collect();
+        smooth_steps(&cameras, &lattices, &meetings)
     }
 
     /// How another photograph sees the `place` that is expected in `direction`; `None` if it does not show it.

@@ -8,7 +8,7 @@ use trueup_core::geometry::{
     exp_rotation, random_rotation, rotation_about_x, rotation_about_y, rotation_about_z, rows_of,
 };
 use trueup_core::lines::LineSegment;
-use trueup_core::matches::{PairMatches, PairVerdict, PointMatch};
+use trueup_core::matches::{PairMatches, PairVerdict, PointMatch, PointMatches};
 use trueup_core::source::WorkingFrame;
 
 use super::{PriorInput, PriorMethod, SimilarityOptions, SimilarityPrior, run};
@@ -176,8 +176,8 @@ pub(crate) fn joined(a: usize, b: usize, inliers: Vec<PointMatch>) -> PairMatche
         needed: 15,
         verdict: PairVerdict::Joined,
         b_from_a: None,
-        inliers,
-        elsewhere: Vec::new(),
+        inliers: inliers.into(),
+        elsewhere: PointMatches::default(),
     }
 }
 

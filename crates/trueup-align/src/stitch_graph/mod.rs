@@ -173,7 +173,7 @@ fn eccentricity(neighbors: &[Vec<usize>], start: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use trueup_core::matches::PairVerdict;
+    use trueup_core::matches::{PairVerdict, PointMatches};
 
     use super::*;
 
@@ -187,8 +187,8 @@ mod tests {
             needed: 15,
             verdict: if agreeing >= 15 { PairVerdict::Joined } else { PairVerdict::TooFewInliers },
             b_from_a: None,
-            inliers: Vec::new(),
-            elsewhere: Vec::new(),
+            inliers: PointMatches::default(),
+            elsewhere: PointMatches::default(),
         }
     }
 

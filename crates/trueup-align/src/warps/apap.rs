@@ -104,7 +104,7 @@ mod tests {
     fn both_kernels_follow_parallax_and_do_not_fold() {
         let mut example = Example::panned(&[0.0, 25.0], 0);
         // Below the middle the scene is nearer: its points are displaced by up to 8 px.
-        for one in &mut example.pairs[0].inliers {
+        for one in example.pairs[0].inliers.iter_mut() {
             one.in_b[0] += 8.0 / (1.0 + (-(one.in_b[1] - 300.0) / 60.0).exp());
         }
         let homography = example.place(WarpModel::Homography).expect("a pair");

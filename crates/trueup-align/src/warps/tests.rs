@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use trueup_core::Error;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_y;
-use trueup_core::matches::{PairMatches, PairVerdict, PointMatch};
+use trueup_core::matches::{PairMatches, PairVerdict, PointMatch, PointMatches};
 use trueup_core::source::WorkingFrame;
 
 use super::*;
@@ -120,8 +120,8 @@ pub(super) fn matched(a: usize, b: usize, b_from_a: impl Fn(Vector2<f64>) -> Opt
         needed: 15,
         verdict: PairVerdict::Joined,
         b_from_a: None,
-        inliers,
-        elsewhere: Vec::new(),
+        inliers: inliers.into(),
+        elsewhere: PointMatches::default(),
     }
 }
 

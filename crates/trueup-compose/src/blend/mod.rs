@@ -152,7 +152,7 @@ impl<'a> Blending<'a> {
         let region = |number: usize| {
             context.check_cancelled()?;
             let parts = &regions[number];
-            let batches = order::batches(work, parts, &bytes, usize::MAX)?;
+            let batches = order::batches(work, parts, &bytes, order::Room::UNLIMITED)?;
             let shown: BTreeSet<Label> = batches.into_iter().flat_map(|batch| batch.shown).collect();
             let own = |&label: &Label| {
                 let at = usize::from(label);
@@ -216,7 +216,8 @@ impl<'a> Blending<'a> {
         let mut kept = input.decoded.kept;
         // Of several placements, the first takes what was kept.
         let kept = (0..placements).map(|at| kept[unrolled.original(at)].take()).collect();
-        let batches = order::batches(&work, parts, &bytes, plan.photographs)?;
+        let room = order::Room { usual: plan.photographs, most: plan.most_photographs };
+        let batches = order::batches(&work, parts, &bytes, room)?;
         let curve = photographs.transfer_curve();
         let local = input.local.map(|local| local.led_by(unrolled.lead()));
         let local = local.as_ref();
@@ -326,7 +327,7 @@ pub(crate) fn finish_region(
     };
     let blending = Blending { input, work };
     let placement_bytes = blending.placement_bytes();
-    let batches = order::batches(&blending.work, &parts, &placement_bytes, usize::MAX)?;
+    let batches = order::batches(&blending.work, &parts, &placement_bytes, order::Room::UNLIMITED)?;
     if !batches.iter().flat_map(|batch| &batch.shown).all(|&label| has_own.contains(&usize::from(label))) {
         return Err(not_asked_for());
     }

@@ -24,12 +24,26 @@ pub(super) struct Batch {
     pub(super) shown: Vec<Label>,
 }
 
-/// The tiles of all `parts` of the canvas in batches whose photographs, of these sizes in `bytes`, take no more than `room` bytes.
+/// Bytes for the photographs of a batch.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Room {
+    /// What several tiles may take together.
+    pub(super) usual: usize,
+    /// What one may that shows more; no less than `usual`.
+    pub(super) most: usize,
+}
+
+impl Room {
+    /// As much as is wanted.
+    pub(super) const UNLIMITED: Self = Self { usual: usize::MAX, most: usize::MAX };
+}
+
+/// The tiles of all `parts` of the canvas in batches whose photographs, of these sizes in `bytes`, have `room`.
 /// Strips run across that side of the canvas which leaves fewer photographs in memory from one strip to the next.
 ///
 /// # Errors
 /// [`Error::Limits`] if a single tile is made of more.
-pub(super) fn batches(work: &BlendWork<'_>, parts: &[Rectangle], bytes: &[usize], room: usize) -> Result<Vec<Batch>> {
+pub(super) fn batches(work: &BlendWork<'_>, parts: &[Rectangle], bytes: &[usize], room: Room) -> Result<Vec<Batch>> {
     let [width, height] = work.shown.unrolled.finished();
     let side = tile_side(work.first_level);
     let cut = |first: usize, length: usize| -> Vec<Range<usize>> {
@@ -123,17 +137,17 @@ fn most_alive(strips: &[Vec<usize>], tiles: &[BlendTile], bytes: &[usize]) -> us
 }
 
 /// Adds the tiles of a strip in as few batches as the room allows.
-fn split(strip: &[usize], tiles: &[BlendTile], bytes: &[usize], room: usize, batches: &mut Vec<Batch>) -> Result<()> {
+fn split(strip: &[usize], tiles: &[BlendTile], bytes: &[usize], room: Room, batches: &mut Vec<Batch>) -> Result<()> {
     let mut batch = Batch { tiles: Vec::new(), shown: Vec::new() };
     for tile in strip.iter().map(|&at| &tiles[at]) {
         let own: Vec<Label> = tile.shown.iter().copied().filter(|&label| usize::from(label) < bytes.len()).collect();
         let size = |labels: &[Label]| labels.iter().map(|&label| bytes[usize::from(label)]).sum::<usize>();
-        if size(&own) > room {
-            return Err(too_many(own.len(), size(&own), room));
+        if size(&own) > room.most {
+            return Err(too_many(own.len(), size(&own), room.most));
         }
         let mut joined = batch.shown.clone();
         joined.extend(own.iter().filter(|label| !batch.shown.contains(label)));
-        if size(&joined) > room {
+        if size(&joined) > room.usual && !batch.tiles.is_empty() {
             batches.push(std::mem::replace(&mut batch, Batch { tiles: Vec::new(), shown: own }));
         } else {
             batch.shown = joined;
@@ -154,5 +168,27 @@ fn too_many(count: usize, needed: usize, room: usize) -> Error {
         needed: format!("{} of memory for them", words(needed)),
         allowed: words(room),
         hint: format!("Raise --memory (resources.memory) by {}.", words(needed - room)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Photographs of 10 bytes each. Of three tiles that show two, the first and the second have one in common; a fourth shows three.
+    #[test]
+    fn a_tile_that_shows_more_than_usual_is_finished_by_itself() {
+        let tile = |shown: &[Label]| BlendTile { columns: 0..1, rows: 0..1, shown: shown.to_vec() };
+        let tiles = [tile(&[0, 1]), tile(&[1, 2]), tile(&[3, 4]), tile(&[2, 3, 4])];
+        let shown = |room: Room| -> Option<Vec<Vec<Label>>> {
+            let mut batches = Vec::new();
+            split(&[0, 1, 2, 3], &tiles, &[10; 5], room, &mut batches).ok()?;
+            Some(batches.into_iter().map(|batch| batch.shown).collect())
+        };
+        let all = |shown: &[&[Label]]| Some(shown.iter().map(|labels| labels.to_vec()).collect());
+        assert_eq!(shown(Room::UNLIMITED), all(&[&[0, 1, 2, 3, 4]]));
+        assert_eq!(shown(Room { usual: 30, most: 30 }), all(&[&[0, 1, 2], &[2, 3, 4]]));
+        assert_eq!(shown(Room { usual: 20, most: 30 }), all(&[&[0, 1], &[1, 2], &[3, 4], &[2, 3, 4]]));
+        assert_eq!(shown(Room { usual: 20, most: 29 }), None);
     }
 }

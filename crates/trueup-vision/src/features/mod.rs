@@ -12,6 +12,7 @@ mod orientation;
 mod patch;
 mod scale_space;
 mod simd;
+mod source;
 
 #[cfg(test)]
 mod tests;
@@ -26,6 +27,8 @@ pub use feature::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint, Features};
 pub use options::FeatureOptions;
 use scale_space::{Octave, SearchSize};
 use simd::InstructionSet;
+pub use source::FeatureSource;
+pub(crate) use source::no_photograph;
 
 /// A photograph with fewer points than this is searched again, doubled: finer detail for four times the work.
 const SPARSE_POINTS: usize = 1000;
@@ -170,6 +173,15 @@ fn describe(octaves: &[Octave], extremum: &Extremum, instructions: InstructionSe
 
 fn gathered(described: Vec<Option<Described>>) -> Features {
     let mut features = Features::default();
+    // No more room than is filled: photographs' features are the most that is known of them.
+    let (mut points, mut descriptors) = (0, 0);
+    for one in described.iter().flatten() {
+        points += 1;
+        descriptors += one.descriptors.len();
+    }
+    features.points.reserve_exact(points);
+    features.descriptors.reserve_exact(descriptors);
+    features.descriptor_points.reserve_exact(descriptors);
     for (index, Described { point, descriptors }) in described.into_iter().flatten().enumerate() {
         features.points.push(point);
         features.descriptor_points.extend(std::iter::repeat_n(index as u32, descriptors.len()));

@@ -32,7 +32,7 @@ use trueup_core::matches::PairMatches;
 use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
 use trueup_core::told_lens::ToldLens;
-use trueup_core::{Error, Result, StageContext};
+use trueup_core::{Result, StageContext};
 
 pub use consistent::{SeenFeatures, consistent_matches};
 pub use duplicates::report_near_duplicates;
@@ -44,14 +44,14 @@ pub use strangers::{Stranger, StrangerKind, StrangersInput, find_strangers};
 pub(crate) use overlap::PredictedOverlap;
 pub(crate) use search::squared_distances;
 
-use crate::features::Features;
+use crate::features::{FeatureSource, Features, no_photograph};
 use pair::{PairInput, PhotographFeatures, match_pair};
 
 /// What matching reads.
 #[derive(Debug, Clone, Copy)]
 pub struct MatchingInput<'a> {
     /// Every photograph's features.
-    pub features: &'a [Features],
+    pub features: &'a dyn FeatureSource,
     /// The frames these are measured in, one a photograph.
     pub frames: &'a [WorkingFrame],
     /// What the user told of each photograph's lens.
@@ -63,14 +63,14 @@ pub struct MatchingInput<'a> {
 }
 
 impl<'a> MatchingInput<'a> {
-    fn photograph(&self, index: usize) -> Result<PhotographFeatures<'a>> {
-        match (self.features.get(index), self.frames.get(index), self.told.get(index)) {
-            (Some(features), Some(frame), Some(&told)) => Ok(PhotographFeatures { index, features, frame, told }),
-            _ => Err(Error::input(
-                format!("photograph {index}"),
-                "a pair names it but it is not there",
-                "Pairs may only name the photographs given.",
-            )),
+    /// A photograph that has these features.
+    fn photograph<'b>(&self, index: usize, features: &'b Features) -> Result<PhotographFeatures<'b>>
+    where
+        'a: 'b,
+    {
+        match (self.frames.get(index), self.told.get(index)) {
+            (Some(frame), Some(&told)) => Ok(PhotographFeatures { index, features, frame, told }),
+            _ => Err(no_photograph(index)),
         }
     }
 }
@@ -91,17 +91,24 @@ pub fn run(
 ) -> Result<Vec<PairMatches>> {
     const STAGE: &str = MatchingOptions::STAGE;
     context.progress().begin(STAGE, input.pairs.len() as u64);
-    let matched: Result<Vec<PairMatches>> = input
-        .pairs
-        .par_iter()
-        .map(|&(a, b)| {
-            let forced = input.forced.contains(&(a.min(b), a.max(b)));
-            let pair = PairInput::new(input.photograph(a)?, input.photograph(b)?, forced);
-            let matches = match_pair(&pair, options, context)?;
-            context.progress().advance(STAGE, 1);
-            Ok(matches)
+    // Pairs of one photograph in a row get its features once.
+    let groups: Vec<&[(usize, usize)]> = input.pairs.chunk_by(|one, next| one.0 == next.0).collect();
+    let matched: Result<Vec<Vec<PairMatches>>> = groups
+        .into_par_iter()
+        .map(|group| {
+            let a = group[0].0;
+            let of_a = input.features.features(a)?;
+            let match_one = |&(_, b): &(usize, usize)| {
+                let forced = input.forced.contains(&(a.min(b), a.max(b)));
+                let of_b = input.features.features(b)?;
+                let pair = PairInput::new(input.photograph(a, &of_a)?, input.photograph(b, &of_b)?, forced);
+                let matches = match_pair(&pair, options, context)?;
+                context.progress().advance(STAGE, 1);
+                Ok(matches)
+            };
+            group.par_iter().map(match_one).collect()
         })
         .collect();
     context.progress().finish(STAGE);
-    matched
+    Ok(matched?.concat())
 }

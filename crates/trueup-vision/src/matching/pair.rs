@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use rand::Rng;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::Homography;
-use trueup_core::matches::{PairMatches, PairVerdict, PointMatch};
+use trueup_core::matches::{PairMatches, PairVerdict, PointMatch, PointMatches};
 use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
 use trueup_core::told_lens::ToldLens;
@@ -178,8 +178,8 @@ pub(super) fn match_pair(
         needed: PairInput::needed(0, forced, options),
         verdict: PairVerdict::TooFewMatches,
         b_from_a: None,
-        inliers: Vec::new(),
-        elsewhere: Vec::new(),
+        inliers: PointMatches::default(),
+        elsewhere: PointMatches::default(),
     };
     if putative.len() < 4 {
         return Ok(pair);
@@ -221,7 +221,7 @@ pub(super) fn match_pair(
     if pair.verdict.is_joined() {
         let joined = JoinedPair { input, putative: &putative, points: &points, model: &model, overlap: &overlap };
         let (inliers, is_known) = joined.all_inliers(options, &mut generator);
-        pair.inliers = inliers;
+        pair.inliers = inliers.into();
         let mut generator = context.generator("matches elsewhere", seed);
         let cameras = model.cameras([a.frame, b.frame]);
         let found = matches_elsewhere(&points, &is_known, &model.b_from_a, &cameras, b.frame, &mut generator);

@@ -1,4 +1,4 @@
-use trueup_core::matches::PairVerdict;
+use trueup_core::matches::{PairVerdict, PointMatches};
 
 use super::*;
 
@@ -18,8 +18,8 @@ fn pair(a: usize, b: usize, scale: f64, right: f64, down: f64) -> PairMatches {
         needed: 30,
         verdict: PairVerdict::Joined,
         b_from_a: Some([[scale, 0.0, right], [0.0, scale, down], [0.0, 0.0, 1.0]]),
-        inliers: Vec::new(),
-        elsewhere: Vec::new(),
+        inliers: PointMatches::default(),
+        elsewhere: PointMatches::default(),
     }
 }
 

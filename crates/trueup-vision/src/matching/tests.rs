@@ -1,6 +1,7 @@
 use nalgebra::{Matrix3, Vector2};
 use proptest::prelude::*;
 use rand::{Rng, RngExt};
+use trueup_core::Error;
 use trueup_core::diagnostics::Subject;
 use trueup_core::geometry::Homography;
 use trueup_core::matches::PairVerdict;

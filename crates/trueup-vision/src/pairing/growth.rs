@@ -104,7 +104,7 @@ impl VerifiedOverlaps {
 
 #[cfg(test)]
 mod tests {
-    use trueup_core::matches::PairVerdict;
+    use trueup_core::matches::{PairVerdict, PointMatches};
 
     use super::*;
 
@@ -123,8 +123,8 @@ mod tests {
             needed: 15,
             verdict: PairVerdict::Joined,
             b_from_a: Some([[1.0, 0.0, -shift], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
-            inliers: Vec::new(),
-            elsewhere: Vec::new(),
+            inliers: PointMatches::default(),
+            elsewhere: PointMatches::default(),
         }
     }
 

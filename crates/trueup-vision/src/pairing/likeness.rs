@@ -1,5 +1,6 @@
 //! Which photographs look alike: those whose features are each other's neighbors.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -10,7 +11,7 @@ use trueup_core::{Result, StageContext};
 
 use super::PairingOptions;
 use super::forest::DescriptorForest;
-use crate::features::{Descriptor, Features};
+use crate::features::{Descriptor, FeatureSource};
 use crate::matching::squared_distances;
 
 /// Strongest features of each photograph that take part.
@@ -44,12 +45,11 @@ pub struct Likeness(pub(super) Vec<Vec<usize>>);
 ///
 /// # Departures
 /// More neighbors than their 4 are taken, and weighed: photographs may overlap many others.
-pub fn likeness(features: &[Features], context: &StageContext<'_>) -> Result<Likeness> {
-    for (index, features) in features.iter().enumerate() {
-        features.check(index)?;
-    }
-    let ballot = Ballot::new(features, context);
-    let photographs = features.len();
+pub fn likeness(features: &dyn FeatureSource, context: &StageContext<'_>) -> Result<Likeness> {
+    let photographs = features.photographs();
+    let strongest: Vec<Cow<[Descriptor]>> =
+        (0..photographs).into_par_iter().map(|index| strongest_of(features, index)).collect::<Result<_>>()?;
+    let ballot = Ballot::new(&strongest, context);
     let groups = ballot.forest.groups();
     // Voters are counted so many photographs at a time.
     let counted_at_once = (COUNTS / photographs.max(1)).max(1);
@@ -72,6 +72,18 @@ pub fn likeness(features: &[Features], context: &StageContext<'_>) -> Result<Lik
     Ok(Likeness(alike))
 }
 
+/// The descriptors of a photograph's strongest features.
+fn strongest_of(source: &dyn FeatureSource, photograph: usize) -> Result<Cow<'_, [Descriptor]>> {
+    let features = source.features(photograph)?;
+    features.check(photograph)?;
+    let count = features.descriptor_points.partition_point(|&point| (point as usize) < COMPARED_FEATURES);
+    Ok(match features {
+        Cow::Borrowed(features) => Cow::Borrowed(&features.descriptors[..count]),
+        // Not the others' room.
+        Cow::Owned(features) => Cow::Owned(features.descriptors[..count].to_vec()),
+    })
+}
+
 /// The features that vote.
 struct Ballot<'a> {
     descriptors: Vec<&'a Descriptor>,
@@ -89,11 +101,12 @@ struct Scratch {
 }
 
 impl<'a> Ballot<'a> {
-    fn new(features: &'a [Features], context: &StageContext<'_>) -> Self {
-        let (mut descriptors, mut photograph_of) = (Vec::new(), Vec::new());
-        for (photograph, features) in features.iter().enumerate() {
-            let strongest = features.descriptor_points.partition_point(|&point| (point as usize) < COMPARED_FEATURES);
-            descriptors.extend(&features.descriptors[..strongest]);
+    /// Of the strongest descriptors of every photograph.
+    fn new(strongest: &'a [Cow<[Descriptor]>], context: &StageContext<'_>) -> Self {
+        let count = strongest.iter().map(|of_one| of_one.len()).sum();
+        let (mut descriptors, mut photograph_of) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for (photograph, strongest) in strongest.iter().enumerate() {
+            descriptors.extend(strongest.iter());
             photograph_of.resize(descriptors.len(), photograph as u32);
         }
         let forest = DescriptorForest::new(&descriptors, context);

@@ -19,7 +19,7 @@ use trueup_core::matches::PairMatches;
 use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
 
-use crate::features::Features;
+use crate::features::FeatureSource;
 use groups::Groups;
 use growth::VerifiedOverlaps;
 
@@ -76,13 +76,13 @@ impl<'a> Proposals<'a> {
     /// # Errors
     /// [`trueup_core::Error::Options`]; those of `likeness`.
     pub fn new(
-        features: &[Features],
+        features: &dyn FeatureSource,
         frames: &'a [WorkingFrame],
         options: &'a PairingOptions,
         likeness: impl FnOnce() -> Result<Likeness>,
     ) -> Result<Self> {
         options.check()?;
-        let count = features.len();
+        let count = features.photographs();
         let likeness = if count <= options.exhaustive_up_to { None } else { Some(likeness()?) };
         // A photograph that was not there when the looks were compared looks like no other.
         let likeness = likeness.map(|Likeness(mut alike)| {
@@ -93,7 +93,7 @@ impl<'a> Proposals<'a> {
         Ok(Self {
             frames,
             options,
-            featured: features.iter().map(|features| !features.descriptors.is_empty()).collect(),
+            featured: (0..count).map(|photograph| features.has_features(photograph)).collect(),
             likeness,
             tried: BTreeSet::new(),
             overlaps: VerifiedOverlaps::default(),

@@ -1,10 +1,10 @@
 use rand::Rng;
 
-use trueup_core::matches::PairVerdict;
+use trueup_core::matches::{PairVerdict, PointMatches};
 use trueup_core::{Error, StageContext};
 
 use super::*;
-use crate::features::{DESCRIPTOR_LENGTH, FeaturePoint};
+use crate::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
 
 /// Photographs along a row: each shares half of its descriptors with the next.
 fn row(count: usize, shared: usize) -> Vec<Features> {
@@ -28,7 +28,7 @@ fn row(count: usize, shared: usize) -> Vec<Features> {
 const FRAME: WorkingFrame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
 
 fn proposals<'a>(features: &[Features], frames: &'a [WorkingFrame], options: &'a PairingOptions) -> Proposals<'a> {
-    Proposals::new(features, frames, options, || likeness(features, &StageContext::default())).expect("valid")
+    Proposals::new(&features, frames, options, || likeness(&features, &StageContext::default())).expect("valid")
 }
 
 /// A pair that was matched; of joined ones, the second shows what lies 200 pixels to the right for each step in order.
@@ -43,8 +43,8 @@ fn matched((a, b): (usize, usize), joined: bool) -> PairMatches {
         needed: 15,
         verdict: if joined { PairVerdict::Joined } else { PairVerdict::TooFewInliers },
         b_from_a: joined.then_some([[1.0, 0.0, -shift], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
-        inliers: Vec::new(),
-        elsewhere: Vec::new(),
+        inliers: PointMatches::default(),
+        elsewhere: PointMatches::default(),
     }
 }
 
@@ -122,7 +122,7 @@ fn photographs_without_features_are_paired_with_their_neighbors_in_order_only() 
 #[test]
 fn bad_options_and_cancelling_are_errors() {
     let options = PairingOptions { neighbors: 0, ..PairingOptions::default() };
-    let outcome = Proposals::new(&[], &[], &options, || Ok(Likeness::default()));
+    let outcome = Proposals::new(&Vec::new(), &[], &options, || Ok(Likeness::default()));
     assert!(matches!(outcome, Err(Error::Options(invalid)) if invalid.len() == 1));
     let token = trueup_core::context::CancelToken::default();
     token.cancel();

@@ -25,6 +25,7 @@ mod tests;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use trueup_core::raster::Raster;
 
 pub use alignment::{AlignedMember, MemberPair, Unaligned, align};
@@ -74,7 +75,7 @@ pub struct StackCandidate<'a> {
 }
 
 /// A stack among the candidates.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FoundStack {
     /// The photograph that tells most, by its number.
     pub reference: usize,
@@ -83,7 +84,7 @@ pub struct FoundStack {
 }
 
 /// A photograph of a stack beside its reference.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FoundMember {
     /// Its number.
     pub photograph: usize,

@@ -22,7 +22,7 @@ use trueup_core::{Result, StageContext};
 pub use folder::{CacheUse, PhotographCache};
 pub(crate) use folder::{checked_content, entry_with_content};
 pub(crate) use key::{Key, KeyMaker, PROGRAM};
-pub(crate) use kind::{GEOMETRY, Kind, LIKENESS, MEASURED, OVERLAPS, PAIR};
+pub(crate) use kind::{GEOMETRY, Kind, LIGHT, LIKENESS, MEASURED, OVERLAPS, PAIR, PARALLAX, STACKS};
 pub(crate) use memory::MemoryStore;
 
 /// Where results are kept; nowhere by default.

@@ -6,6 +6,7 @@ use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use nalgebra::Matrix3;
+use serde::Serialize;
 use trueup_align::mesh::CameraPlane;
 use trueup_align::metrics::without_torn_cells;
 use trueup_align::projection::{
@@ -20,6 +21,7 @@ use trueup_core::{Error, Result, StageContext};
 
 use super::align::Geometry;
 use super::align::component::Component;
+use crate::memo::{KeyMaker, Memo, PARALLAX};
 use crate::options::ArrangeOptions;
 use crate::project::projection::{ProjectionRecord, WHOLE_SPHERE};
 use crate::project::record::{ImageRecord, Project};
@@ -128,12 +130,13 @@ impl ArrangeInput {
 pub(crate) fn run(
     input: ArrangeInput,
     options: &ArrangeOptions,
+    memo: Memo,
     context: &StageContext,
 ) -> Result<Reported<Arrangement>> {
-    context.gather(|context| context.time("canvas", || lay_out(input, options, context)))
+    context.gather(|context| context.time("canvas", || lay_out(input, options, memo, context)))
 }
 
-fn lay_out(input: ArrangeInput, options: &ArrangeOptions, context: &StageContext) -> Result<Arrangement> {
+fn lay_out(input: ArrangeInput, options: &ArrangeOptions, memo: Memo, context: &StageContext) -> Result<Arrangement> {
     let ArrangeInput { placed, reference, cameras, dominant, period, by_cameras, is_flat_scene } = input;
     let by_mesh = options.projection.kind == Projection::Mesh && by_cameras.is_none();
     let is_drawn = cameras.is_none() || by_mesh;
@@ -141,7 +144,7 @@ fn lay_out(input: ArrangeInput, options: &ArrangeOptions, context: &StageContext
     // A canvas that is never drawn is of a size that is nobody's concern.
     let plane = if is_drawn { lay(context)? } else { context.gather(lay)?.value };
     let by_cameras = by_cameras.map(|by_cameras| by_cameras.moved(plane.origin, plane.canvas_from_target));
-    on_plane(Plane { layout: plane, reference, cameras, dominant, by_cameras, is_flat_scene }, options, context)
+    on_plane(Plane { layout: plane, reference, cameras, dominant, by_cameras, is_flat_scene }, options, memo, context)
 }
 
 /// Arranges the photographs of `project`, recorded on `plane`, as the options ask: with the recorded options as they were
@@ -163,10 +166,11 @@ pub(crate) fn recall(
             let wanted = CanvasOptions { crop, min_kept, fill, ..options.canvas.clone() };
             let input = ArrangeInput::of_project(plane.placed.clone(), reference, project);
             if wanted != project.options.arrange.canvas {
-                return lay_out(input, options, context);
+                return lay_out(input, options, Memo::default(), context);
             }
             let ArrangeInput { cameras, dominant, by_cameras, is_flat_scene, .. } = input;
-            on_plane(Plane { layout: plane, reference, cameras, dominant, by_cameras, is_flat_scene }, options, context)
+            let plane = Plane { layout: plane, reference, cameras, dominant, by_cameras, is_flat_scene };
+            on_plane(plane, options, Memo::default(), context)
         })
     })
 }
@@ -186,7 +190,7 @@ struct Plane {
     is_flat_scene: bool,
 }
 
-fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> Result<Arrangement> {
+fn on_plane(plane: Plane, options: &ArrangeOptions, memo: Memo, context: &StageContext) -> Result<Arrangement> {
     let Plane { layout: plane, reference, cameras, dominant, by_cameras, is_flat_scene } = plane;
     let asked = match (options.projection.kind, by_cameras) {
         // There is no mesh: the view that suits.
@@ -220,7 +224,10 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
     let max_parallax = asked.max_parallax_deg.to_radians();
     let shifts = match by_cameras {
         Some(by_cameras) => photographs.iter().map(|photograph| by_cameras.shift(photograph)).collect(),
-        None => projection::parallax_shifts(&photographs, plane.period.map(|period| period as f64), max_parallax),
+        None => {
+            let input = Unrolled { photographs: &photographs, period: plane.period.map(|period| period as f64) };
+            parallax_shifts(&input, max_parallax, memo, context)?
+        }
     };
     context.check_cancelled()?;
     let scene = Scene { photographs: &photographs, shifts: &shifts, view: &view };
@@ -230,6 +237,35 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
     report_cut(&plane, &drawn, &view, options, context);
     let projection = Some(ProjectionRecord::new(&view, &drawn));
     Ok(Arrangement { delivered: scene.delivered(&drawn), plane, drawn, projection, by_cameras })
+}
+
+/// Photographs on the mesh's plane, and its turn if it closes on itself.
+#[derive(Debug, Serialize)]
+struct Unrolled<'a> {
+    photographs: &'a [PosedPhotograph],
+    period: Option<f64>,
+}
+
+/// How far the photographs give way, whatever they are drawn on: unless an earlier run found it for the same grids and cameras.
+fn parallax_shifts(
+    input: &Unrolled,
+    max_parallax: f64,
+    memo: Memo,
+    context: &StageContext,
+) -> Result<Vec<ParallaxShift>> {
+    let content = memo.disk.map(|_| KeyMaker::new().part(input));
+    let key = memo.key(PARALLAX, content, &max_parallax);
+    let is_whole = |shifts: &Vec<ParallaxShift>| {
+        let sizes = shifts.iter().map(|shift| shift.aside.len());
+        sizes.eq(input.photographs.iter().map(|photograph| photograph.mesh.len()))
+    };
+    if let Some(known) = memo.load(PARALLAX, key.as_ref()).filter(is_whole) {
+        return Ok(known);
+    }
+    let found = projection::parallax_shifts(input.photographs, input.period, max_parallax);
+    context.check_cancelled()?;
+    memo.store(PARALLAX, key.as_ref(), &found);
+    Ok(found)
 }
 
 /// Photographs that a view shows.
@@ -348,10 +384,10 @@ mod tests {
         };
         let mut options = ArrangeOptions::default();
         options.projection.kind = Projection::Perspective;
-        let refused = run(input(None), &options, &StageContext::default()).expect_err("no camera");
+        let refused = run(input(None), &options, Memo::default(), &StageContext::default()).expect_err("no camera");
         assert!(matches!(refused, Error::NotApplicable { .. }), "{refused}");
         options.projection.kind = Projection::Auto;
-        let kept = run(input(None), &options, &StageContext::default()).expect("as it is").value;
+        let kept = run(input(None), &options, Memo::default(), &StageContext::default()).expect("as it is").value;
         assert_eq!((kept.drawn.width, kept.drawn.height, kept.projection), (40, 30, None));
     }
 }

@@ -35,6 +35,16 @@ const PIXEL_BYTES: usize = 4;
 /// copy when it is turned upright.
 const DECODING: usize = 2;
 
+/// Bytes of a photograph's features, as detailed ones have: 5,000 descriptors, of 170 bytes with their points.
+const FEATURES_OF_ONE: usize = 850_000;
+
+/// The part of the memory that features may have at least until they are matched, whatever measuring leaves: 1 / 16, and of what is counted for
+/// the program a little.
+const FEATURE_PART: usize = 16;
+
+/// With room for so many photographs per thread, no more are worked at at once.
+pub(super) const MANY_PER_THREAD: usize = 4;
+
 /// What to do where it is the option that allows too little.
 const RAISE_OPTION: &str = "Raise --memory (resources.memory), or give smaller photographs.";
 
@@ -90,7 +100,7 @@ impl Budget {
         let images = photographs.sources();
         let bytes = |image: &SourceImage| image.width.saturating_mul(image.height).saturating_mul(PIXEL_BYTES);
         let Some(largest) = images.iter().max_by_key(|image| bytes(image)) else {
-            return Ok(Measuring { at_once: usize::MAX, kept_bytes: 0 });
+            return Ok(Measuring { at_once: usize::MAX, kept_bytes: 0, held_features: 0 });
         };
         // One after the other: what is not kept of a photograph is let go before features are found in its working copy.
         let reduced = (REDUCED_BYTES * working_pixels) as usize;
@@ -111,19 +121,25 @@ impl Budget {
         // Keeping some of many saves little; keeping all of a small set saves decoding it twice.
         let all = images.iter().map(|image| bytes(image).saturating_add(reduced)).fold(0, usize::saturating_add);
         let kept_bytes = if all <= memory / 4 { all } else { 0 };
-        Ok(Measuring { at_once: ((memory - kept_bytes) / one).max(1), kept_bytes })
+        let at_once = ((memory - kept_bytes) / one).max(1);
+        let busy = at_once.min(MANY_PER_THREAD * rayon::current_num_threads()).saturating_mul(one);
+        let left = (memory - kept_bytes).saturating_sub(busy).max(memory / FEATURE_PART);
+        let held_features = left.min(images.len().saturating_mul(FEATURES_OF_ONE));
+        Ok(Measuring { at_once, kept_bytes, held_features })
     }
 
-    /// What composing may take beside what is kept of the photographs, and what the decoders of some of them take: every thread's, or
-    /// where that is too much, one's.
+    /// What composing may take beside what the program takes already, and what the decoders of some photographs take: every thread's, or
+    /// where that is too much, one's. What is refused depends on the photographs alone: what is known of many leaves less room,
+    /// but never none.
     pub(super) fn composing<'a>(&self, photographs: &FilePhotographs, scratch: &'a dyn ScratchSpace) -> Resources<'a> {
+        let taken = machine::taken().and_then(|bytes| usize::try_from(bytes).ok()).unwrap_or(0);
+        let counted = PROGRAM_BYTES.saturating_add(photographs.kept_bytes());
         let surplus = photographs.decoding_surplus();
-        let left = |bytes: usize, decoders: usize| {
-            let taken = PROGRAM_BYTES.saturating_add(photographs.kept_bytes());
+        let left = |bytes: usize, taken: usize, decoders: usize| {
             bytes.saturating_sub(taken.saturating_add(surplus.saturating_mul(decoders)))
         };
-        let memory = left(self.memory, rayon::current_num_threads());
-        Resources { memory, ceiling: left(self.ceiling, 1), scratch, helpers: None }
+        let memory = left(self.memory, counted.max(taken), rayon::current_num_threads());
+        Resources { memory, ceiling: left(self.ceiling, counted, 1), scratch, helpers: None }
     }
 }
 
@@ -134,6 +150,8 @@ pub(crate) struct Measuring {
     pub at_once: usize,
     /// Bytes of decoded photographs to be kept.
     pub kept_bytes: usize,
+    /// Bytes of features that stay in memory until they are matched; those beyond go to a scratch file.
+    pub held_features: usize,
 }
 
 #[cfg(test)]
@@ -197,6 +215,10 @@ mod tests {
     fn photographs_of_eight_megapixels_are_measured_in_a_quarter_of_a_gigabyte() {
         let measuring = budget("256MB").measuring(&images(5, 3264, 2448), WORKING_PIXELS).expect("enough");
         assert_eq!((measuring.at_once, measuring.kept_bytes), (1, 0));
+        // Of 160 MB 117 are for one at a time: 43 MB are left, more than five need.
+        assert_eq!(measuring.held_features, 5 * FEATURES_OF_ONE);
+        let many = budget("256MB").measuring(&images(500, 3264, 2448), WORKING_PIXELS).expect("enough");
+        assert_eq!((many.at_once, many.held_features), (1, 160_000_000 - 117_360_000));
         assert!(budget("200MB").measuring(&images(1, 3264, 2448), WORKING_PIXELS).is_err());
     }
 

@@ -1,16 +1,19 @@
 //! The compose phase: light, then seams and the panorama, from the full-resolution photographs.
 
+use serde::Serialize;
 use trueup_compose::crop::{Coverage, Crop, Frame, Framing, Rectangle};
-use trueup_compose::exposure::{self, Corrections, ExposureInput, Thumbnail};
+use trueup_compose::exposure::{self, Corrections, ExposureInput, ExposureOptions, Thumbnail};
 use trueup_compose::gaps::Gaps;
 use trueup_compose::layout::{CanvasLayout, CanvasOptions};
-use trueup_compose::render::{self, RenderInput, Rendered, Resources};
+use trueup_compose::render::{self, Look, RenderInput, Rendered, Resources};
 use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
+use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
 use trueup_core::source::{PhotographSource, WorkingFrame};
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 
+use crate::memo::{KeyMaker, LIGHT, Memo};
 use crate::options::ComposeOptions;
 
 /// A photograph's small copy, with the camera that took it.
@@ -42,17 +45,51 @@ pub(crate) fn light(
     options: &ComposeOptions,
     context: &StageContext,
 ) -> Result<Reported<Corrections>> {
+    known_light(input, None, Memo::default(), options, context)
+}
+
+/// The options that decide how light is evened out.
+#[derive(Debug, Serialize)]
+struct LightOptions<'a> {
+    exposure: &'a ExposureOptions,
+    look: Look,
+}
+
+/// [`light`], unless an earlier run found it for the same photographs, decided by `key`, at the same places.
+///
+/// # Errors
+/// Those of [`light`].
+pub(crate) fn known_light(
+    input: &LightInput,
+    key: Option<KeyMaker>,
+    memo: Memo,
+    options: &ComposeOptions,
+    context: &StageContext,
+) -> Result<Reported<Corrections>> {
+    let places: Vec<(usize, &GridMesh)> =
+        input.layout.placed.iter().map(|placed| (placed.photograph, &placed.mesh)).collect();
+    let size = (input.layout.width, input.layout.height, input.layout.period);
+    let small: Vec<(WorkingFrame, usize)> = input.small.iter().map(|one| (one.frame, one.camera)).collect();
+    let content = key.map(|key| key.part(&places).part(&size).part(&small).part(&input.reference));
+    let decisive = LightOptions { exposure: &options.exposure, look: options.render.look };
+    let key = memo.key(LIGHT, content, &decisive);
+    let is_whole = |known: &Reported<Corrections>| known.value.photographs.len() == input.small.len();
+    match memo.recall(LIGHT, key.as_ref()).filter(is_whole) {
+        Some(known) => Ok(known),
+        None => memo.make(LIGHT, key.as_ref(), input, &decisive, evened_out, context),
+    }
+}
+
+fn evened_out(input: &LightInput, options: &LightOptions, context: &StageContext) -> Result<Corrections> {
     let curve = input.photographs.transfer_curve();
     let thumbnails: Vec<Thumbnail> = input
         .small
         .iter()
         .map(|one| Thumbnail { raster: one.thumbnail, curve: &curve, frame: one.frame, camera: one.camera })
         .collect();
-    let look = options.render.look;
-    let light = ExposureInput { layout: input.layout, thumbnails: &thumbnails, reference: input.reference, look };
-    context.gather(|context| {
-        context.time("exposure", || Ok(exposure::run(&light, &options.exposure, context)?.corrections))
-    })
+    let LightInput { layout, reference, .. } = *input;
+    let light = ExposureInput { layout, thumbnails: &thumbnails, reference, look: options.look };
+    context.time("exposure", || Ok(exposure::run(&light, options.exposure, context)?.corrections))
 }
 
 /// What composing works on.

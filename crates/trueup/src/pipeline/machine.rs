@@ -71,6 +71,11 @@ pub(super) fn memory(threads: usize) -> MachineMemory {
     MachineMemory { total: total.min(least), free: free.min(least), hard }
 }
 
+/// What this program takes of the machine's memory now, in bytes; `None` where the system does not say.
+pub(super) fn taken() -> Option<u64> {
+    kibibytes(&fs::read_to_string("/proc/self/status").ok()?, "VmRSS:")
+}
+
 /// The narrowest of all limits that the files below `root` tell of; none where there are no such files.
 fn hard_limit(root: &Path, threads: usize) -> Option<HardLimit> {
     let status = fs::read_to_string(root.join("proc/self/status")).unwrap_or_default();

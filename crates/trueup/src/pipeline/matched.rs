@@ -1,12 +1,14 @@
 //! The photographs after matching: what is known of them, which groups they make, and what cannot go on.
 
+use std::borrow::Cow;
+
 use trueup_align::stitch_graph::{GraphFile, StitchGraph};
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::RejectedSource;
-use trueup_vision::features::Features;
+use trueup_vision::features::{FeatureSource, Features};
 use trueup_vision::matching::Stranger;
 
 use super::align::component::Component;
@@ -14,6 +16,7 @@ use super::compose::SmallPhotograph;
 use super::measure::{Measurements, concerns_one_photograph};
 use super::measured::Measured;
 use super::photographs::PhotographSet;
+use super::shelf::ShelvedFeatures;
 use crate::job::inputs::{Inputs, Reference};
 use crate::job::names::reference_named;
 use crate::memo::{Key, KeyMaker};
@@ -40,9 +43,27 @@ pub(crate) struct Matched {
 
 /// What matching looks at, taken out of the measurements so that it is gone when matching is done.
 pub(crate) struct LookedAt {
-    pub features: Vec<Features>,
+    pub features: MeasuredFeatures,
     pub frames: Vec<WorkingFrame>,
     pub usable: Vec<bool>,
+}
+
+/// The features of all photographs, none of those that could not be decoded.
+#[derive(Debug)]
+pub(crate) struct MeasuredFeatures(Vec<ShelvedFeatures>);
+
+impl FeatureSource for MeasuredFeatures {
+    fn photographs(&self) -> usize {
+        self.0.len()
+    }
+
+    fn features(&self, photograph: usize) -> Result<Cow<'_, Features>> {
+        self.0.get(photograph).map_or_else(|| Ok(Cow::default()), ShelvedFeatures::get)
+    }
+
+    fn has_features(&self, photograph: usize) -> bool {
+        self.0.get(photograph).is_some_and(ShelvedFeatures::has_descriptors)
+    }
 }
 
 impl Matched {
@@ -74,7 +95,7 @@ impl Matched {
         LookedAt {
             frames: self.measured.iter().map(frame).collect(),
             usable: self.measured.iter().map(Option::is_some).collect(),
-            features: self.measured.iter_mut().map(|one| features(one).unwrap_or_default()).collect(),
+            features: MeasuredFeatures(self.measured.iter_mut().map(|one| features(one).unwrap_or_default()).collect()),
         }
     }
 

@@ -8,7 +8,7 @@ use trueup_core::matches::PairMatches;
 use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::told_lens::ToldLens;
 use trueup_core::{Result, StageContext};
-use trueup_vision::features::Features;
+use trueup_vision::features::FeatureSource;
 use trueup_vision::matching::{self, Stranger, StrangersInput};
 use trueup_vision::pairing::{Likeness, Proposals, likeness};
 
@@ -19,7 +19,7 @@ use crate::workers::Division;
 /// What the phase works on. Photographs are counted 0..N; `features`, `frames`, `told`, `usable`, `images` and `keys` have N entries.
 #[derive(Debug)]
 pub(crate) struct MatchInput<'a> {
-    pub features: &'a [Features],
+    pub features: &'a dyn FeatureSource,
     pub frames: &'a [WorkingFrame],
     /// What the user told of each lens.
     pub told: &'a [ToldLens],
@@ -61,7 +61,7 @@ pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageCon
         let is_stranger = |photograph| strangers.iter().any(|stranger| stranger.photograph == photograph);
         let known = || pairs.iter().filter(|pair| !is_stranger(pair.a) && !is_stranger(pair.b));
         matching::report_near_duplicates(known(), context);
-        let graph = StitchGraph::new(input.features.len(), known());
+        let graph = StitchGraph::new(input.features.photographs(), known());
         Ok(Matches { pairs, strangers, graph })
     })
 }

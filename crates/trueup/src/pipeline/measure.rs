@@ -12,8 +12,10 @@ use trueup_io::decode::FilePhotographs;
 use trueup_vision::features;
 use trueup_vision::lines;
 
+use super::budget::MANY_PER_THREAD;
 use super::measured::Measured;
 use super::photographs::PhotographSet;
+use super::shelf::{Shelf, ShelvedFeatures};
 use crate::job::masks::{blacken, curves_outside, lines_outside, outside};
 use crate::memo::{Key, MEASURED, Memo};
 use crate::options::MeasureOptions;
@@ -25,15 +27,13 @@ const STAGE: &str = "measuring";
 /// be kept for every photograph.
 pub(crate) const THUMBNAIL_PIXELS: f64 = 30_000.0;
 
-/// With room for so many photographs per thread, no group of them is waited for.
-const MANY_PER_THREAD: usize = 4;
-
 /// What the phase works on.
-#[derive(Debug)]
 pub(crate) struct MeasureInput<'a> {
     pub set: &'a PhotographSet,
     /// Where what earlier runs measured is found.
     pub memo: Memo<'a>,
+    /// Where the features go.
+    pub shelf: &'a Shelf<'a>,
     /// Whether the gray values are handed on, for a mesh that is refined by pixels.
     pub keep_grays: bool,
     /// Who measures photographs elsewhere.
@@ -72,7 +72,7 @@ pub(crate) fn run(
     context: &StageContext,
 ) -> Result<Reported<Measurements>> {
     context.gather(|context| {
-        let MeasureInput { set, memo, keep_grays, workers } = input;
+        let MeasureInput { set, memo, shelf, keep_grays, workers } = input;
         let contents = match memo.disk {
             Some(_) => context.time("source", || set.keys(&(0..set.images.len()).collect::<Vec<_>>(), context))?,
             None => vec![None; set.images.len()],
@@ -81,13 +81,13 @@ pub(crate) fn run(
         let count = set.images.len();
         context.progress().begin(STAGE, count as u64);
         let start = Instant::now();
-        let mut known: Vec<Option<Reported<Measured>>> =
-            keys.par_iter().map(|key| memo.recall(MEASURED, key.as_ref())).collect();
+        let recall = |key: &Option<Key>| memo.recall(MEASURED, key.as_ref()).map(|known| shelved(known, shelf));
+        let mut known: Vec<Option<Reported<Measured>>> = keys.par_iter().map(recall).collect();
         if let Some(workers) = workers {
             let missing: Vec<usize> = (0..count).filter(|&index| known[index].is_none()).collect();
             workers.measured(&set.files, &missing, *keep_grays, context, |index, measured| {
                 memo.store(MEASURED, keys[index].as_ref(), &measured);
-                known[index] = Some(measured);
+                known[index] = Some(shelved(measured, shelf));
                 context.progress().advance(STAGE, 1);
             })?;
         }
@@ -98,12 +98,12 @@ pub(crate) fn run(
             let one = OnePhotograph { files: &set.files, index, keep_grays: *keep_grays };
             let measured = memo.make(MEASURED, keys[index].as_ref(), &one, options, measure, context);
             context.progress().advance(STAGE, 1);
-            measured
+            measured.map(|measured| shelved(measured, shelf))
         };
         // Threads that share a photograph's work may begin another one meanwhile: where memory counts, only groups limit
         // them.
         let mut measured: Vec<Result<Reported<Measured>>> = Vec::with_capacity(count);
-        for group in groups(count, set.at_once) {
+        for group in groups(count, set.measuring.at_once) {
             let first = group.start;
             let known: Vec<_> = known.drain(..group.len()).collect();
             let numbered = known.into_par_iter().enumerate().map(|(index, known)| (first + index, known));
@@ -150,7 +150,7 @@ pub(crate) fn of_some(
         }
     };
     let mut measured = Vec::with_capacity(photographs.len());
-    for group in photographs.chunks(set.at_once.max(1)) {
+    for group in photographs.chunks(set.measuring.at_once.max(1)) {
         measured.extend(group.par_iter().map(measured_one).collect::<Result<Vec<_>>>()?);
     }
     Ok(measured)
@@ -167,7 +167,7 @@ pub(crate) fn some(
     context: &StageContext,
 ) -> Result<Reported<Measurements>> {
     context.gather(|context| {
-        let MeasureInput { set, memo, keep_grays, .. } = input;
+        let MeasureInput { set, memo, shelf, keep_grays, .. } = input;
         let contents = match memo.disk {
             Some(_) => context.time("source", || set.keys(photographs, context))?,
             None => vec![None; photographs.len()],
@@ -175,20 +175,27 @@ pub(crate) fn some(
         let numbered: Vec<(usize, Option<Key>)> =
             photographs.iter().copied().zip(contents.into_iter().map(|one| memo.key(MEASURED, one, options))).collect();
         let measured_one = |(index, key): &(usize, Option<Key>)| {
-            if let Some(known) = memo.recall(MEASURED, key.as_ref()) {
-                return Ok(known);
-            }
             let one = OnePhotograph { files: &set.files, index: *index, keep_grays: *keep_grays };
-            memo.make(MEASURED, key.as_ref(), &one, options, measure, context)
+            let measured = match memo.recall(MEASURED, key.as_ref()) {
+                Some(known) => Ok(known),
+                None => memo.make(MEASURED, key.as_ref(), &one, options, measure, context),
+            };
+            measured.map(|measured| shelved(measured, shelf))
         };
         let mut measured: Vec<Result<Reported<Measured>>> = Vec::with_capacity(photographs.len());
-        for group in numbered.chunks(set.at_once.max(1)) {
+        for group in numbered.chunks(set.measuring.at_once.max(1)) {
             measured.par_extend(group.par_iter().map(measured_one));
         }
         context.check_cancelled()?;
         let photographs = measured.into_iter().map(|one| one.map(|one| context.absorb(one))).collect();
         Ok(Measurements { photographs, keys: numbered.into_iter().map(|(_, key)| key).collect() })
     })
+}
+
+/// What was measured, its features on the shelf.
+fn shelved(measured: Reported<Measured>, shelf: &Shelf) -> Reported<Measured> {
+    let Reported { value, findings, seconds } = measured;
+    Reported { value: Measured { features: value.features.put_on(shelf), ..value }, findings, seconds }
 }
 
 fn measure(one: &OnePhotograph, options: &MeasureOptions, context: &StageContext) -> Result<Measured> {
@@ -217,6 +224,7 @@ fn measure(one: &OnePhotograph, options: &MeasureOptions, context: &StageContext
         blacken(&mut thumbnail, &ignored, &picture.thumbnail_frame);
     }
     let gray = keep_grays.then(|| eight_bit(&picture.gray));
+    let features = ShelvedFeatures::Held(features);
     Ok(Measured { frame, features, lines, curves, gray, thumbnail, thumbnail_frame: picture.thumbnail_frame })
 }
 
@@ -260,7 +268,7 @@ pub(crate) fn thumbnails(
     };
     let count = photographs.sources().len();
     let mut thumbnails = Vec::with_capacity(count);
-    for group in groups(count, set.at_once) {
+    for group in groups(count, set.measuring.at_once) {
         thumbnails.extend(group.into_par_iter().map(thumbnail).collect::<Result<Vec<_>>>()?);
     }
     Ok(thumbnails)

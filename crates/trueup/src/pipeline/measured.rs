@@ -1,17 +1,20 @@
 //! What is known of a photograph after its pixels were looked at, and how that is kept between runs.
 
 use serde::de::Error as _;
+use serde::ser::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::raster::Raster;
 use trueup_core::source::WorkingFrame;
 use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
 
+use super::shelf::ShelvedFeatures;
+
 /// What is known of a photograph after its pixels were looked at.
 #[derive(Debug)]
 pub(crate) struct Measured {
     pub frame: WorkingFrame,
-    pub features: Features,
+    pub features: ShelvedFeatures,
     /// In working pixels.
     pub lines: Vec<LineSegment>,
     /// Edges that may be straight lines of the scene, in working pixels.
@@ -24,7 +27,7 @@ pub(crate) struct Measured {
 
 impl Serialize for Measured {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        StoredMeasured::new(self).serialize(serializer)
+        StoredMeasured::new(self).map_err(S::Error::custom)?.serialize(serializer)
     }
 }
 
@@ -70,19 +73,19 @@ struct StoredMeasured {
 }
 
 impl StoredMeasured {
-    fn new(measured: &Measured) -> Self {
-        let Features { points, descriptors, descriptor_points } = &measured.features;
-        Self {
+    fn new(measured: &Measured) -> trueup_core::Result<Self> {
+        let Features { points, descriptors, descriptor_points } = measured.features.get()?.into_owned();
+        Ok(Self {
             frame: measured.frame,
-            points: points.clone(),
-            descriptors: descriptors.concat(),
-            descriptor_points: descriptor_points.clone(),
+            points,
+            descriptors: descriptors.into_flattened(),
+            descriptor_points,
             lines: measured.lines.clone(),
             curves: measured.curves.clone(),
             gray: measured.gray.as_ref().map(StoredRaster::new),
             thumbnail: StoredRaster::new(&measured.thumbnail),
             thumbnail_frame: measured.thumbnail_frame,
-        }
+        })
     }
 
     fn restored(self) -> Option<Measured> {
@@ -92,11 +95,11 @@ impl StoredMeasured {
         }
         Some(Measured {
             frame: self.frame,
-            features: Features {
+            features: ShelvedFeatures::Held(Features {
                 points: self.points,
                 descriptors: descriptors.to_vec(),
                 descriptor_points: self.descriptor_points,
-            },
+            }),
             lines: self.lines,
             curves: self.curves,
             gray: match self.gray {

@@ -21,6 +21,7 @@ pub(crate) mod photographs;
 mod rearrange;
 mod results;
 mod scratch;
+pub(crate) mod shelf;
 mod stacking;
 
 use std::path::Path;
@@ -50,6 +51,7 @@ use self::matched::Matched;
 use self::matching::MatchInput;
 use self::measure::MeasureInput;
 use self::photographs::{FoundPhotographs, PhotographSet};
+use self::shelf::Shelf;
 use self::stacking::{Stacked, StackingInput};
 use crate::job::inputs::Inputs;
 use crate::memo::{KeyMaker, Memo, PhotographCache};
@@ -151,10 +153,13 @@ impl<'a> Stitcher<'a> {
             let found = context.gather(|context| PhotographSet::find(inputs, self.options, context))?;
             let graph_file = inputs.graph_file(&found.value.names())?;
             let keep_grays = align::needs_pixels(&self.options.align);
-            let input = MeasureInput { set: &found.value, memo, keep_grays, workers: self.workers };
+            let scratch = scratch::while_measuring(self.options, self.output);
+            let shelf = Shelf::new(&scratch, found.value.images.len(), found.value.measuring.held_features);
+            let shelf = &shelf;
+            let input = MeasureInput { set: &found.value, memo, shelf, keep_grays, workers: self.workers };
             let measurements = measure::run(&input, &self.options.measure, context)?;
             let keeps_light = self.output.is_some_and(|path| self.options.compose.output.keeps_light(path));
-            let input = StackingInput { found, measurements, graph_file, memo, keep_grays, keeps_light };
+            let input = StackingInput { found, measurements, graph_file, memo, shelf, keep_grays, keeps_light };
             let Stacked { set, measurements, graph_file } = stacking::run(input, self.options, context)?;
             let mut matched = Matched::unmatched(set, measurements, graph_file)?;
             let looked_at = matched.take_features();
@@ -267,14 +272,17 @@ impl<'a> Stitcher<'a> {
             }
         };
         let input = ArrangeInput::of_geometry(place(&component, geometry.as_ref()), &component, geometry.as_ref());
-        let arrangement = context.absorb(arrange::run(input, &fixed.arrange, context)?);
+        let memo = Memo { disk: self.cache, memory: None };
+        let arrangement = context.absorb(arrange::run(input, &fixed.arrange, memo, context)?);
         let light = LightInput {
             layout: &arrangement.lit_plane(),
             small: matched.small_photographs(&component),
             reference: component.reference,
             photographs,
         };
-        let corrections = context.absorb(compose::light(&light, &self.options.compose, context)?);
+        let key = matched.key_of(members);
+        let corrections = compose::known_light(&light, key, memo, &self.options.compose, context)?;
+        let corrections = context.absorb(corrections);
         let mut project = unfilled(matched, &fixed, members, groups);
         let geometry = geometry.as_ref();
         let found =

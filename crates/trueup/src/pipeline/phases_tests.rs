@@ -73,3 +73,23 @@ fn changing_an_option_runs_exactly_its_phase_and_the_later_ones_again() {
     }
     assert!(counted.iter().all(|&count| count > 0), "options of every phase: {counted:?}");
 }
+
+/// What a later phase decides alone makes nothing again of what is costly before it, or beside it.
+#[test]
+fn another_frame_or_another_light_makes_again_what_it_changes_alone() {
+    let desk = tempfile::tempdir().expect("a folder");
+    let folder: PathBuf = desk.path().join("cache");
+    let mut base = StitchOptions::default();
+    base.set(WORKING_PIXELS).expect("an option");
+    let made = |assignment: &str| {
+        let mut options = base.clone();
+        options.set(assignment).expect("an option");
+        let uses = uses(&options, &folder);
+        ["stacks", "geometry", "parallax", "light"].map(|kind| uses(kind)[1])
+    };
+    assert_eq!(made("canvas.crop=auto"), [1; 4], "the first time");
+    assert_eq!(made("canvas.crop=none"), [0; 4]);
+    assert_eq!(made("projection.kind=cylindrical"), [0; 4]);
+    assert_eq!(made("exposure.model=gain"), [0, 0, 0, 1]);
+    assert_eq!(made("projection.max_parallax_deg=1"), [0, 0, 1, 0]);
+}

@@ -13,7 +13,7 @@ use trueup_io::color::PhotographColors;
 use trueup_io::decode::FilePhotographs;
 use trueup_io::source::{self, InMemory, RejectedSource, Sources};
 
-use super::budget::Budget;
+use super::budget::{Budget, Measuring};
 use super::frames;
 use super::light::{self, WantedLight};
 use crate::job::inputs::{Inputs, Reference};
@@ -52,8 +52,8 @@ pub(crate) struct PhotographSet {
     pub lens_from: Option<PathBuf>,
     /// Their pixels.
     pub files: Arc<FilePhotographs>,
-    /// How many of them may be measured at once.
-    pub at_once: usize,
+    /// How they are measured within the memory.
+    pub measuring: Measuring,
 }
 
 impl PhotographSet {
@@ -113,8 +113,7 @@ impl PhotographSet {
             None => PhotographColors::survey(&images, context),
         };
         let files = over(&images, measuring.kept_bytes).in_colors(colors).in_light(light).with_masks(masks);
-        let (files, at_once) = (Arc::new(files), measuring.at_once);
-        Ok(Self { images, rejected, masks: records, lens_from: None, files, at_once })
+        Ok(Self { images, rejected, masks: records, lens_from: None, files: Arc::new(files), measuring })
     }
 
     /// The names by which people know the photographs.

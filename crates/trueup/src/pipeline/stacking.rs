@@ -16,8 +16,9 @@ use super::align::component::{camera_groups, lens_groups};
 use super::light::{self, WantedLight};
 use super::measure::{self, MeasureInput, Measurements, THUMBNAIL_PIXELS, concerns_one_photograph};
 use super::photographs::{FoundPhotographs, PhotographSet};
+use super::shelf::Shelf;
 use crate::job::masks::AllMasks;
-use crate::memo::Memo;
+use crate::memo::{Key, KeyMaker, Memo, STACKS};
 use crate::options::StitchOptions;
 
 const STAGE: &str = "stacks";
@@ -32,6 +33,7 @@ pub(super) struct StackingInput<'a> {
     pub measurements: Reported<Measurements>,
     pub graph_file: GraphFile,
     pub memo: Memo<'a>,
+    pub shelf: &'a Shelf<'a>,
     pub keep_grays: bool,
     /// Whether the panorama will be written with what is brighter than white.
     pub keeps_light: bool,
@@ -64,10 +66,10 @@ impl AlignedStack {
 /// # Errors
 /// [`trueup_core::Error::Limits`]; [`trueup_core::Error::Cancelled`].
 pub(super) fn run(input: StackingInput, options: &StitchOptions, context: &StageContext) -> Result<Stacked> {
-    let StackingInput { found, measurements, graph_file, memo, keep_grays, keeps_light } = input;
+    let StackingInput { found, measurements, graph_file, memo, shelf, keep_grays, keeps_light } = input;
     let stacks = match options.measure.stacks.fuse {
         Fuse::Auto | Fuse::Light => {
-            context.time(STAGE, || aligned_stacks(&found.value, &measurements.value, options, context))?
+            context.time(STAGE, || aligned_stacks(&found.value, &measurements.value, memo, options, context))?
         }
         Fuse::None => Vec::new(),
     };
@@ -94,7 +96,7 @@ pub(super) fn run(input: StackingInput, options: &StitchOptions, context: &Stage
     for (&number, stack) in fused.iter().zip(&stacks) {
         context.report(fused_note(number, stack, &set));
     }
-    let input = MeasureInput { set: &set, memo, keep_grays, workers: None };
+    let input = MeasureInput { set: &set, memo, shelf, keep_grays, workers: None };
     let anew: Vec<usize> = if is_new_light { (0..set.images.len()).collect() } else { fused };
     let measured = context.absorb(measure::some(&input, &anew, &options.measure, context)?);
     let Measurements { photographs, keys } = old_measurements;
@@ -167,6 +169,7 @@ impl Numbering {
 fn aligned_stacks(
     set: &PhotographSet,
     measurements: &Measurements,
+    memo: Memo,
     options: &StitchOptions,
     context: &StageContext,
 ) -> Result<Vec<AlignedStack>> {
@@ -186,10 +189,10 @@ fn aligned_stacks(
             StackCandidate { thumbnail, camera, recorded_stops: set.images[number].exposure.stops }
         })
         .collect();
-    let found = stacks::find(&candidates);
+    let found = known_stacks(&candidates, &measurements.keys, memo);
     let mut aligned = Vec::new();
     // As many as may be measured at once, each of which reads two photographs at a time.
-    for group in found.chunks((set.at_once / 2).max(1)) {
+    for group in found.chunks((set.measuring.at_once / 2).max(1)) {
         context.check_cancelled()?;
         let stacks: Vec<Option<AlignedStack>> =
             group.par_iter().map(|stack| aligned_stack(stack, set, options, context)).collect::<Result<_>>()?;
@@ -197,6 +200,28 @@ fn aligned_stacks(
     }
     aligned.sort_by_key(|stack| stack.reference);
     Ok(aligned)
+}
+
+/// The stacks among the candidates, whose measurements are decided by `keys`, unless an earlier run found them among the same ones in the
+/// same order.
+fn known_stacks(candidates: &[StackCandidate], keys: &[Option<Key>], memo: Memo) -> Vec<FoundStack> {
+    let of_one = |maker: KeyMaker, (candidate, key): (&StackCandidate, &Option<Key>)| {
+        let StackCandidate { thumbnail, camera, recorded_stops } = candidate;
+        Some(maker.key(key.as_ref()?).part(&(thumbnail.is_some(), camera, recorded_stops)))
+    };
+    let content = candidates.iter().zip(keys).try_fold(KeyMaker::new(), of_one);
+    let key = memo.key(STACKS, content, &());
+    let is_among = |stack: &FoundStack| {
+        let numbers = stack.others.iter().map(|other| other.photograph).chain([stack.reference]);
+        numbers.into_iter().all(|number| number < candidates.len())
+    };
+    let known = memo.load::<Vec<FoundStack>>(STACKS, key.as_ref());
+    if let Some(known) = known.filter(|known| known.iter().all(is_among)) {
+        return known;
+    }
+    let found = stacks::find(candidates);
+    memo.store(STACKS, key.as_ref(), &found);
+    found
 }
 
 /// `None` where no member lies on the reference, or a file can no longer be read: each photograph then stands for itself.

@@ -129,6 +129,8 @@ pub(crate) fn none_usable(inputs: Vec<(String, String, String)>) -> Error {
 
 #[cfg(test)]
 mod tests {
+    use trueup_core::matches::PointMatches;
+
     use super::*;
 
     fn pair(a: usize, b: usize, agreeing: usize, verdict: PairVerdict) -> PairMatches {
@@ -141,8 +143,8 @@ mod tests {
             needed: 15,
             verdict,
             b_from_a: None,
-            inliers: Vec::new(),
-            elsewhere: Vec::new(),
+            inliers: PointMatches::default(),
+            elsewhere: PointMatches::default(),
         }
     }
 

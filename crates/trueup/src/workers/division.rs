@@ -103,8 +103,8 @@ impl<'a> Division<'a> {
                 pairs: tasks[number].iter().map(pair).collect(),
                 photographs: photographs
                     .iter()
-                    .map(|&one| FeaturesOfOne::new(&features[one], frames[one], told[one]))
-                    .collect(),
+                    .map(|&one| Ok(FeaturesOfOne::new(features.features(one)?.as_ref(), frames[one], told[one])))
+                    .collect::<Result<_>>()?,
             })
         };
         let mut found: Vec<MatchResult> = tasks.iter().map(|_| Vec::new()).collect();

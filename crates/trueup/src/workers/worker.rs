@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use trueup_compose::render::{self, RenderInput};
+use trueup_core::scratch::NoScratch;
 use trueup_core::{Error, Result, StageContext};
 use trueup_vision::matching::{self, MatchingInput};
 
@@ -14,6 +15,7 @@ use crate::memo::{Memo, PROGRAM};
 use crate::pipeline::light::WantedLight;
 use crate::pipeline::measure::{self, MeasureInput};
 use crate::pipeline::photographs::{FoundPhotographs, PhotographSet};
+use crate::pipeline::shelf::Shelf;
 use crate::pipeline::{composing_resources, scratch_folder};
 
 /// Does tasks that a [`Stitcher`](crate::Stitcher) hands out by [`Workers`](super::Workers), in whatever program it did not itself.
@@ -95,7 +97,8 @@ impl Worker {
         if task.iter().any(|&photograph| photograph >= set.images.len()) {
             return Err(damaged("there is no such photograph"));
         }
-        let input = MeasureInput { set, memo: Memo::default(), keep_grays, workers: None };
+        let shelf = &Shelf::new(&NoScratch, 0, usize::MAX);
+        let input = MeasureInput { set, memo: Memo::default(), shelf, keep_grays, workers: None };
         measure::of_some(&input, task, &self.common.options.measure, context)
     }
 

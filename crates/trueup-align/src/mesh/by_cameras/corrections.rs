@@ -6,7 +6,7 @@ use trueup_core::mesh::GridMesh;
 
 use super::super::alignment::overlap_cells;
 use super::super::complex::product;
-use super::super::normal_equations::{CarriedVertex, NormalEquations};
+use super::super::normal_equations::{CarriedVertex, NormalEquations, solved_grids};
 use super::super::options::MeshOptions;
 use super::super::similarity::{PRIOR_SLOPE, SimilarityEnergy};
 use super::super::solver::MeshSolver;
@@ -43,16 +43,15 @@ impl CameraCorrections {
     pub(super) fn find(input: &ByCamerasInput, options: &MeshOptions) -> Option<Self> {
         let still = |grid: &GridMesh| GridMesh { target: vec![[0.0; 2]; grid.len()], ..grid.clone() };
         let mut corrections = Self { steps: input.grids.iter().map(still).collect(), relative_gradient: 0.0 };
-        let shape = shape_energy(input, options);
         let mut solver = MeshSolver::default();
         for _ in 0..ROUNDS {
-            let mut equations = shape.clone();
+            let mut equations = shape_energy(input, options);
             corrections.add_matches(input, options.alignment_weight.powi(2), &mut equations);
-            let solution = solver.solve(&equations)?;
+            let solution = solver.solve(equations)?;
             if !solution.coordinates.iter().all(|coordinate| coordinate.is_finite()) {
                 return None;
             }
-            corrections.steps = equations.meshes(input.grids, &solution.coordinates);
+            corrections.steps = solved_grids(input.grids, &solution.coordinates);
             corrections.relative_gradient = solution.relative_gradient;
         }
         Some(corrections)

@@ -21,12 +21,12 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode;
 
 use super::key::Key;
-use super::kind::{GEOMETRY, Kind, LIKENESS, MEASURED, PAIR};
+use super::kind::{GEOMETRY, Kind, LIGHT, LIKENESS, MEASURED, PAIR, PARALLAX, STACKS};
 
 pub(crate) use entry::{content as checked_content, with_checksum as entry_with_content};
 
 /// The kinds of entries.
-const KINDS: [Kind; 4] = [MEASURED, PAIR, LIKENESS, GEOMETRY];
+const KINDS: [Kind; 7] = [MEASURED, STACKS, PAIR, LIKENESS, GEOMETRY, PARALLAX, LIGHT];
 /// How the files of entries end.
 const EXTENSION: &str = "trueup";
 /// How names of files begin and end that are not complete yet.
@@ -96,8 +96,9 @@ impl PhotographCache {
         Ok(Self { folder: folder.to_owned(), max_bytes, uses: Mutex::default(), trouble: Mutex::default() })
     }
 
-    /// How often results were found and made, by what they are: `measured` (a photograph), `pair`, `likeness` (how all
-    /// look like each other) and `geometry` (a panorama).
+    /// How often results were found and made, by what they are: `measured` (a photograph), `stacks` (which of all are one), `pair`, `likeness`
+    /// (how all look like each other), `geometry` (a panorama), `parallax` (how far its photographs give way) and `light` (what evens
+    /// theirs out).
     pub fn uses(&self) -> BTreeMap<&'static str, CacheUse> {
         self.uses.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }

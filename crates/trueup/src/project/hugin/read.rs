@@ -16,6 +16,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
 use super::parse::{Fields, HuginLines};
+use crate::memo::Memo;
 use crate::options::StitchOptions;
 use crate::pipeline::arrange::{self, ArrangeInput};
 use crate::project::fill::{empty, left_out_record, record_appearance, record_canvas};
@@ -139,7 +140,7 @@ impl HuginProject {
             by_cameras: drawn.by_cameras,
             is_flat_scene: false,
         };
-        let arrangement = arrange::run(input, &options.arrange, context)?.value;
+        let arrangement = arrange::run(input, &options.arrange, Memo::default(), context)?.value;
         let plain = Corrections::plain(found.len());
         let mut project = empty(&options);
         project.manhattan.failed_clause = Some("it was aligned in Hugin".to_owned());
