@@ -82,8 +82,8 @@ impl<'a> MatchingInput<'a> {
 /// at least `min_inliers` and pass the Brown-Lowe test. Of a pair that the user's graph joins, fewer must agree.
 ///
 /// # Errors
-/// [`Error::Options`]; [`Error::Input`] if a pair names a photograph that is not there or twice the same, or if features
-/// contradict themselves; [`Error::Cancelled`].
+/// [`trueup_core::Error::Options`]; [`trueup_core::Error::Input`] if a pair names a photograph that is not there or twice the same, or if features
+/// contradict themselves; those of reading features; [`trueup_core::Error::Cancelled`].
 pub fn run(
     input: &MatchingInput<'_>,
     options: &MatchingOptions,
