@@ -43,7 +43,7 @@ pub use options::{
 };
 pub use pipeline::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use project::{
-    Canvas, CropRecord, FlatSceneRecord, HuginImage, HuginProject, ImageRecord, ImageStatus, LevelRecord,
+    Canvas, CropRecord, FlatSceneRecord, HuginImage, HuginProject, ImageRecord, ImageStatus, LevelRecord, LineGuide,
     ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, ProjectionRecord,
     StackMemberRecord, hugin_project, read_project,
 };

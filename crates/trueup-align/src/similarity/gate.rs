@@ -34,17 +34,13 @@ pub(super) struct CameraAngle {
 
 impl CameraAngle {
     /// Whether it is farther than the cameras allow: where their rolls contradict each other, as with one photograph on its corner, they
-    /// know little.
-    pub(super) fn is_too_wide(self) -> bool {
+    /// know little; and so do two that may look up or down alike, if lines `agree_closely`.
+    pub(super) fn is_too_wide(self, agree_closely: bool) -> bool {
         // Not-a-number is too wide.
         let is_near = self.angle.to_degrees() <= MAX_CAMERA_ANGLE_DEG || self.deviations <= MAX_CAMERA_DEVIATIONS;
-        !is_near
-    }
-
-    /// Whether photographs that look up or down alike explain it.
-    pub(super) fn is_steep(self) -> bool {
         let held_level = self.rolls.is_some_and(|rolls| rolls.to_degrees() <= MAX_CAMERA_ANGLE_DEG);
-        held_level && self.angle.to_degrees() <= MAX_STEEP_DEG
+        let is_steep = held_level && self.angle.to_degrees() <= MAX_STEEP_DEG;
+        !(is_near || is_steep && agree_closely)
     }
 }
 
@@ -135,7 +131,7 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
         ));
     }
     let agree_closely = divergence <= STEEP_DIVERGENCE_SHARE * allowed;
-    if let Some(wide) = from_cameras.filter(|found| found.is_too_wide() && !(found.is_steep() && agree_closely)) {
+    if let Some(wide) = from_cameras.filter(|found| found.is_too_wide(agree_closely)) {
         let (angle, allowed) = told_apart(wide.angle.to_degrees(), MAX_CAMERA_ANGLE_DEG, 1);
         return Some(format!(
             "the dominant vertical is {angle} degrees from the vertical of the cameras ({allowed} allowed)"

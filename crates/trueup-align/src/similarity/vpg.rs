@@ -91,7 +91,9 @@ pub(super) fn guide(
     context.check_cancelled()?;
     let mut down = level.down;
     let (before, triads) = (guidance.clone(), scene.triads.clone());
-    if let Some(dominant) = dominant.filter(|_| guidance.failed_clause.is_none()) {
+    let agreed = dominant.filter(|_| guidance.failed_clause.is_none());
+    let is_agreed = agreed.is_some();
+    if let Some(dominant) = agreed {
         match scene.solve_dominant(dominant, &mut guidance) {
             Ok(upright) => return Ok(Guided { guidance, upright: Some(upright), level: down }),
             Err(level) => down = level,
@@ -100,12 +102,12 @@ pub(super) fn guide(
     // The published gate knows no other frame than the one that the photographs agree on.
     if let Some(pooled) = pooled.filter(|_| options.gate == GateMode::Full) {
         scene.triads = triads;
-        let mut again = Guidance { failed_clause: guidance.failed_clause.clone(), ..before.clone() };
+        let mut again = Guidance { failed_clause: guidance.failed_clause.clone(), ..before };
         if let Some(dominant) = scene.pooled(&pooled, &mut again) {
             match scene.solve_dominant(dominant, &mut again) {
                 Ok(upright) => return Ok(Guided { guidance: again, upright: Some(upright), level: down }),
                 // What refuses it says nothing of directions that photographs agreed on, whose own refusal stands.
-                Err(level) if before.failed_clause.is_some() => (guidance, down) = (again, level),
+                Err(level) if !is_agreed => (guidance, down) = (again, level),
                 Err(_) => {}
             }
         }
@@ -194,13 +196,12 @@ impl<'a> SceneDirections<'a> {
 
     /// The frame of the pooled search, if it stands out far enough: for where photographs agree on none, or on one that leaves the vertical open.
     fn pooled(&self, pooled: &PooledFrames, guidance: &mut Guidance) -> Option<Dominant> {
-        let stands_out = pooled.significance >= GUIDING_SIGNIFICANCE;
-        if !stands_out {
+        if pooled.significance < GUIDING_SIGNIFICANCE {
             return None;
         }
         let frame = pooled.refined(&self.vote)?;
-        let from_cameras = self.level.angle_to(&self.vertical(&frame));
-        if from_cameras.is_some_and(|found| found.is_too_wide() && !found.is_steep()) {
+        // What stands out so far is agreed on.
+        if self.level.angle_to(&self.vertical(&frame)).is_some_and(|found| found.is_too_wide(true)) {
             return None;
         }
         let residuals = self.triads.iter().map(|triad| triad.map(|triad| triad_residual(&frame, &triad))).collect();

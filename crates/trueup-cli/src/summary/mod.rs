@@ -13,7 +13,7 @@ mod tests;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use trueup::{FlatEvidence, FlatSceneRecord, LensKind, OptionValue, Project, Severity, Written};
+use trueup::{FlatEvidence, FlatSceneRecord, LensKind, LineGuide, OptionValue, Project, Severity, Written};
 
 use crate::words::file_size;
 
@@ -207,19 +207,16 @@ fn upright(project: &Project) -> String {
     let certain = manhattan
         .vertical_deviation_deg
         .map_or(String::new(), |deviation| format!(", certain to {deviation:.1} degrees"));
-    match (manhattan.accepted, &manhattan.failed_clause) {
-        (true, _) if manhattan.pooled => format!("guided by the lines of all photographs together{certain}{slope}"),
-        (true, Some(_)) => format!("guided by upright lines alone{certain}{slope}"),
-        (true, None) => format!(
+    match manhattan.guide() {
+        Some(LineGuide::AllLines) => format!("guided by the lines of all photographs together{certain}{slope}"),
+        Some(LineGuide::UprightLines) => format!("guided by upright lines alone{certain}{slope}"),
+        Some(LineGuide::VanishingPoints) => format!(
             "guided by vanishing points ({}; {} of {} photographs agree){slope}",
             divergence.unwrap_or(trusted),
             manhattan.inliers.len(),
             project.used()
         ),
-        (false, clause) => {
-            let why = clause.as_ref().map_or(String::new(), |clause| format!(": {clause}"));
-            format!("not guided by vanishing points{why}")
-        }
+        None => format!("not guided by vanishing points{}", manhattan.refusal_in_words()),
     }
 }
 

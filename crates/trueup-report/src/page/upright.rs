@@ -1,7 +1,7 @@
 //! Why the panorama stands as it does: vanishing points, leans, and every photograph with its lines.
 
 use serde_json::{Value, json};
-use trueup::{ImageRecord, PhotographMeasures, Project};
+use trueup::{ImageRecord, LineGuide, PhotographMeasures, Project};
 
 use super::figures::{along, chart, count, figure, reaching_down};
 use super::{Page, picture};
@@ -36,25 +36,23 @@ fn guidance(project: &Project) -> String {
     let slope = found.slope_deg.map_or(String::new(), |slope| {
         format!(" Lines along a slope of {slope:.1} degrees, such as those of a pavement, did not count.")
     });
-    let guidance = match (found.accepted, found.pooled) {
-        (true, true) => {
+    let guidance = match found.guide() {
+        Some(LineGuide::AllLines) => {
             "The lines of all photographs together told which way is down, since those of single ones did not agree."
                 .to_owned()
         }
-        (true, false) if found.failed_clause.is_some() => {
+        Some(LineGuide::UprightLines) => {
             "Upright lines alone told which way is down, since the directions of others did not agree.".to_owned()
         }
-        (true, false) => format!(
+        Some(LineGuide::VanishingPoints) => format!(
             "Vanishing points told which way is down: those of {} of {} photographs agree.",
             found.inliers.len(),
             project.used()
         ),
-        (false, _) => {
-            let why = found.failed_clause.as_ref().map_or(String::new(), |clause| format!(": {clause}"));
-            format!(
-                "Vanishing points did not guide this panorama{why}. It is upright as far as the camera was held level."
-            )
-        }
+        None => format!(
+            "Vanishing points did not guide this panorama{}. It is upright as far as the camera was held level.",
+            found.refusal_in_words()
+        ),
     };
     guidance + &slope
 }

@@ -27,8 +27,7 @@ pub use feature::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint, Features};
 pub use options::FeatureOptions;
 use scale_space::{Octave, SearchSize};
 use simd::InstructionSet;
-pub use source::FeatureSource;
-pub(crate) use source::no_photograph;
+pub use source::{FeatureSource, no_photograph};
 
 /// A photograph with fewer points than this is searched again, doubled: finer detail for four times the work.
 const SPARSE_POINTS: usize = 1000;

@@ -36,8 +36,8 @@ impl<T: AsRef<[Features]> + Debug + Sync> FeatureSource for T {
     }
 }
 
-/// What is said of a number that no photograph has.
-pub(crate) fn no_photograph(photograph: usize) -> Error {
+/// What a [`FeatureSource`] says of a number that no photograph has.
+pub fn no_photograph(photograph: usize) -> Error {
     Error::input(
         format!("photograph {photograph}"),
         "a pair names it but it is not there",

@@ -280,9 +280,9 @@ fn shown_of(
     // What was cropped by hand, each picture otherwise, has neither a camera's format nor another one's size.
     let is_as_taken = |photograph: usize| {
         let of_photograph = sides(&frames[photograph]);
-        let others = (0..frames.len()).filter(|&other| other != photograph && other != picture);
-        is_camera_format(of_photograph)
-            || others.into_iter().any(|other| same_size(of_photograph, sides(&frames[other])))
+        let is_another = |other| ![photograph, picture].contains(&other);
+        let is_alike = |other| is_another(other) && same_size(of_photograph, sides(&frames[other]));
+        is_camera_format(of_photograph) || (0..frames.len()).any(is_alike)
     };
     let mut covered = vec![false; GRID * GRID];
     let (mut whole, mut mostly) = (BTreeSet::new(), BTreeSet::new());

@@ -52,6 +52,25 @@ impl Memo<'_> {
         }
     }
 
+    /// The result of this key that the disk holds, if it `is_whole`; else what `make` comes to, which is kept.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub(crate) fn found_or_made<T: Serialize + DeserializeOwned>(
+        &self,
+        kind: Kind,
+        key: Option<&Key>,
+        is_whole: impl Fn(&T) -> bool,
+        make: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
+        if let Some(known) = self.load(kind, key).filter(is_whole) {
+            return Ok(known);
+        }
+        let made = make()?;
+        self.store(kind, key, &made);
+        Ok(made)
+    }
+
     /// What `work` makes of `input` by `options`, with its findings, unless the disk holds it under `key`, which must say all
     /// that decides `input` and `options`.
     ///

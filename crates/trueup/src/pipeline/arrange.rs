@@ -259,13 +259,11 @@ fn parallax_shifts(
         let sizes = shifts.iter().map(|shift| shift.aside.len());
         sizes.eq(input.photographs.iter().map(|photograph| photograph.mesh.len()))
     };
-    if let Some(known) = memo.load(PARALLAX, key.as_ref()).filter(is_whole) {
-        return Ok(known);
-    }
-    let found = projection::parallax_shifts(input.photographs, input.period, max_parallax);
-    context.check_cancelled()?;
-    memo.store(PARALLAX, key.as_ref(), &found);
-    Ok(found)
+    memo.found_or_made(PARALLAX, key.as_ref(), is_whole, || {
+        let found = projection::parallax_shifts(input.photographs, input.period, max_parallax);
+        context.check_cancelled()?;
+        Ok(found)
+    })
 }
 
 /// Photographs that a view shows.

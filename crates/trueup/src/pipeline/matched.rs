@@ -8,7 +8,7 @@ use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::RejectedSource;
-use trueup_vision::features::{FeatureSource, Features};
+use trueup_vision::features::{self, FeatureSource, Features};
 use trueup_vision::matching::Stranger;
 
 use super::align::component::Component;
@@ -58,7 +58,7 @@ impl FeatureSource for MeasuredFeatures {
     }
 
     fn features(&self, photograph: usize) -> Result<Cow<'_, Features>> {
-        self.0.get(photograph).map_or_else(|| Ok(Cow::default()), ShelvedFeatures::get)
+        self.0.get(photograph).ok_or_else(|| features::no_photograph(photograph))?.get()
     }
 
     fn has_features(&self, photograph: usize) -> bool {

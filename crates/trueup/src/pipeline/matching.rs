@@ -96,12 +96,7 @@ fn match_pairs(input: &MatchInput, options: &MatchOptions, context: &StageContex
 fn known_likeness(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Likeness> {
     let content = input.keys.iter().try_fold(KeyMaker::new(), |maker, key| Some(maker.key(key.as_ref()?)));
     let key = input.memo.key(LIKENESS, content, options);
-    if let Some(known) = input.memo.load(LIKENESS, key.as_ref()) {
-        return Ok(known);
-    }
-    let found = likeness(input.features, context)?;
-    input.memo.store(LIKENESS, key.as_ref(), &found);
-    Ok(found)
+    input.memo.found_or_made(LIKENESS, key.as_ref(), |_| true, || likeness(input.features, context))
 }
 
 /// These pairs, in their order, without those of photographs that could not be measured.

@@ -176,10 +176,7 @@ pub(crate) fn some(
             photographs.iter().copied().zip(contents.into_iter().map(|one| memo.key(MEASURED, one, options))).collect();
         let measured_one = |(index, key): &(usize, Option<Key>)| {
             let one = OnePhotograph { files: &set.files, index: *index, keep_grays: *keep_grays };
-            let measured = match memo.recall(MEASURED, key.as_ref()) {
-                Some(known) => Ok(known),
-                None => memo.make(MEASURED, key.as_ref(), &one, options, measure, context),
-            };
+            let measured = memo.run(MEASURED, key.as_ref(), &one, options, measure, context);
             measured.map(|measured| shelved(measured, shelf))
         };
         let mut measured: Vec<Result<Reported<Measured>>> = Vec::with_capacity(photographs.len());

@@ -257,12 +257,13 @@ impl<'a> Stitcher<'a> {
         let fixed = self.options.fixed_by_method();
         let (matched, photographs) = (&set.matched, &set.matched.set.files);
         let component = matched.component(members, inputs)?;
+        let memo = Memo { disk: self.cache, memory: set.memory.as_ref() };
         let input = AlignInput {
             component: &component,
             photographs,
             directions: known_directions(directions, members)?,
             key: matched.key_of(members).map(|key: KeyMaker| key.part(&self.options.matching)),
-            memo: Memo { disk: self.cache, memory: set.memory.as_ref() },
+            memo,
         };
         let geometry: Option<Geometry> = match members.len() {
             1 => None,
@@ -272,7 +273,6 @@ impl<'a> Stitcher<'a> {
             }
         };
         let input = ArrangeInput::of_geometry(place(&component, geometry.as_ref()), &component, geometry.as_ref());
-        let memo = Memo { disk: self.cache, memory: None };
         let arrangement = context.absorb(arrange::run(input, &fixed.arrange, memo, context)?);
         let light = LightInput {
             layout: &arrangement.lit_plane(),

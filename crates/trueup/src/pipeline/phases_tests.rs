@@ -15,6 +15,12 @@ fn photographs() -> Vec<String> {
     ["02.jpg", "03.jpg"].map(|name| room.join(name).display().to_string()).to_vec()
 }
 
+fn quick() -> StitchOptions {
+    let mut options = StitchOptions::default();
+    options.set(WORKING_PIXELS).expect("an option");
+    options
+}
+
 /// Some other value of an option that is allowed.
 fn changed(base: &StitchOptions, row: &OptionDescription, folder: &Path) -> StitchOptions {
     let number = row.default.parse::<f64>().unwrap_or(f64::NAN);
@@ -45,8 +51,7 @@ fn uses(options: &StitchOptions, folder: &Path) -> impl Fn(&str) -> [usize; 2] +
 fn changing_an_option_runs_exactly_its_phase_and_the_later_ones_again() {
     let desk = tempfile::tempdir().expect("a folder");
     let folder: PathBuf = desk.path().join("cache");
-    let mut base = StitchOptions::default();
-    base.set(WORKING_PIXELS).expect("an option");
+    let base = quick();
     let first = uses(&base, &folder);
     assert_eq!([first("measured"), first("pair"), first("geometry")], [[0, 2], [0, 1], [0, 1]]);
     let tables = StitchOptions::tables();
@@ -79,10 +84,8 @@ fn changing_an_option_runs_exactly_its_phase_and_the_later_ones_again() {
 fn another_frame_or_another_light_makes_again_what_it_changes_alone() {
     let desk = tempfile::tempdir().expect("a folder");
     let folder: PathBuf = desk.path().join("cache");
-    let mut base = StitchOptions::default();
-    base.set(WORKING_PIXELS).expect("an option");
     let made = |assignment: &str| {
-        let mut options = base.clone();
+        let mut options = quick();
         options.set(assignment).expect("an option");
         let uses = uses(&options, &folder);
         ["stacks", "geometry", "parallax", "light"].map(|kind| uses(kind)[1])

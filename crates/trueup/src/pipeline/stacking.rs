@@ -189,7 +189,7 @@ fn aligned_stacks(
             StackCandidate { thumbnail, camera, recorded_stops: set.images[number].exposure.stops }
         })
         .collect();
-    let found = known_stacks(&candidates, &measurements.keys, memo);
+    let found = known_stacks(&candidates, &measurements.keys, memo)?;
     let mut aligned = Vec::new();
     // As many as may be measured at once, each of which reads two photographs at a time.
     for group in found.chunks((set.measuring.at_once / 2).max(1)) {
@@ -204,7 +204,7 @@ fn aligned_stacks(
 
 /// The stacks among the candidates, whose measurements are decided by `keys`, unless an earlier run found them among the same ones in the
 /// same order.
-fn known_stacks(candidates: &[StackCandidate], keys: &[Option<Key>], memo: Memo) -> Vec<FoundStack> {
+fn known_stacks(candidates: &[StackCandidate], keys: &[Option<Key>], memo: Memo) -> Result<Vec<FoundStack>> {
     let of_one = |maker: KeyMaker, (candidate, key): (&StackCandidate, &Option<Key>)| {
         let StackCandidate { thumbnail, camera, recorded_stops } = candidate;
         Some(maker.key(key.as_ref()?).part(&(thumbnail.is_some(), camera, recorded_stops)))
@@ -215,13 +215,8 @@ fn known_stacks(candidates: &[StackCandidate], keys: &[Option<Key>], memo: Memo)
         let numbers = stack.others.iter().map(|other| other.photograph).chain([stack.reference]);
         numbers.into_iter().all(|number| number < candidates.len())
     };
-    let known = memo.load::<Vec<FoundStack>>(STACKS, key.as_ref());
-    if let Some(known) = known.filter(|known| known.iter().all(is_among)) {
-        return known;
-    }
-    let found = stacks::find(candidates);
-    memo.store(STACKS, key.as_ref(), &found);
-    found
+    let is_whole = |known: &Vec<FoundStack>| known.iter().all(is_among);
+    memo.found_or_made(STACKS, key.as_ref(), is_whole, || Ok(stacks::find(candidates)))
 }
 
 /// `None` where no member lies on the reference, or a file can no longer be read: each photograph then stands for itself.

@@ -174,7 +174,7 @@ pub struct ManhattanRecord {
     /// By how much the scene's level lines lie along a slope, degrees: these do not count. `None` where they agree with the upright ones.
     #[serde(default)]
     pub slope_deg: Option<f64>,
-    /// The clause of the gate that failed, in words.
+    /// The clause of the gate that the photographs' own directions failed, in words.
     pub failed_clause: Option<String>,
     /// Dominant directions as columns, in the levelled world.
     pub dominant: Option<[[f64; 3]; 3]>,
@@ -183,6 +183,17 @@ pub struct ManhattanRecord {
     /// What told of the vertical, and of how much; empty for methods that ask nothing but the overlaps.
     #[serde(default)]
     pub level: Vec<LevelRecord>,
+}
+
+/// Which lines guided a panorama.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LineGuide {
+    /// The vanishing points that photographs agree on.
+    VanishingPoints,
+    /// Those of all photographs together.
+    AllLines,
+    /// Upright ones alone: photographs' own directions were refused.
+    UprightLines,
 }
 
 /// What one source said of the vertical, and what it came to count for.
@@ -221,6 +232,21 @@ fn count_of_photographs(count: usize) -> String {
 }
 
 impl ManhattanRecord {
+    /// Which lines guided the panorama; `None` if none did.
+    pub fn guide(&self) -> Option<LineGuide> {
+        let guide = match &self.failed_clause {
+            _ if self.pooled => LineGuide::AllLines,
+            Some(_) => LineGuide::UprightLines,
+            None => LineGuide::VanishingPoints,
+        };
+        self.accepted.then_some(guide)
+    }
+
+    /// Why the photographs' own vanishing points did not guide it, as ": " and the clause; empty where that is not known.
+    pub fn refusal_in_words(&self) -> String {
+        self.failed_clause.as_ref().map_or(String::new(), |clause| format!(": {clause}"))
+    }
+
     /// What told of the vertical, and of how much, in words; `None` where nothing was asked.
     pub fn level_in_words(&self) -> Option<String> {
         let worth_naming = self.level.iter().filter(|one| one.share >= LevelRecord::WORTH_NAMING);
