@@ -13,11 +13,10 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 
+use super::compared::{COMPARED_FEATURES, ComparedPair, MAX_SAMPLES};
 use super::epipolar::epipolar_matches;
 use super::matched_points::MatchedPoints;
 use super::options::MatchingOptions;
-use super::pair::{COMPARED_FEATURES, MAX_SAMPLES, by_distinctiveness, fingerprint, matched_points};
-use super::putative::putative_matches;
 use super::ransac::{HomographySearch, find_homography};
 use crate::features::Features;
 
@@ -63,23 +62,21 @@ pub fn consistent_matches(
 ) -> Result<Vec<PointMatch>> {
     options.check()?;
     context.check_cancelled()?;
-    let [compared_a, compared_b] = [a, b].map(|one| one.features.strongest(COMPARED_FEATURES));
-    let putative = by_distinctiveness(putative_matches(&compared_a, &compared_b, options));
-    let points = matched_points(&putative);
-    let seed = fingerprint(a.features).rotate_left(1) ^ fingerprint(b.features);
-    let mut generator = context.generator("consistent matches", seed);
+    let compared = ComparedPair::new(a.features, b.features, COMPARED_FEATURES, options);
+    let points = &compared.points;
+    let mut generator = context.generator("consistent matches", compared.seed());
     let search = HomographySearch {
         inlier_px: options.inlier_px,
         max_samples: MAX_SAMPLES,
         useful_inliers: options.min_inliers,
         start: None,
     };
-    let Ok(most) = find_homography(&points, &search, |_| true, &mut generator) else { return Ok(Vec::new()) };
+    let Ok(most) = find_homography(points, &search, |_| true, &mut generator) else { return Ok(Vec::new()) };
     if most.inliers.len() < options.min_inliers {
         return Ok(Vec::new());
     }
     context.check_cancelled()?;
-    let supported = supported(&points, &most.b_from_a, FARTHEST_DIAGONAL * b.frame.diagonal());
+    let supported = supported(points, &most.b_from_a, FARTHEST_DIAGONAL * b.frame.diagonal());
     let points = points.select(&supported);
     let agreeing = of_one_geometry(&points, [a.camera, b.camera], &mut generator);
     if agreeing.len() < options.min_inliers {

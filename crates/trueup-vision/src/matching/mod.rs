@@ -7,6 +7,7 @@
 //! no photographs of the scene (`strangers`). Whether or not homographies explain it, `consistent` finds what two photographs show alike, to measure
 //! a panorama by (`epipolar`).
 
+mod compared;
 mod consistent;
 mod duplicates;
 mod epipolar;

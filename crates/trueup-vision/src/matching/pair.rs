@@ -10,22 +10,17 @@ use trueup_core::source::WorkingFrame;
 use trueup_core::told_lens::ToldLens;
 use trueup_core::{Error, Result, StageContext};
 
+use super::compared::{COMPARED_FEATURES, ComparedPair, MAX_SAMPLES};
 use super::consistent::matches_elsewhere;
 use super::guided::{GuidedInput, PlaneMap, PointMap, guided_matches};
 use super::matched_points::MatchedPoints;
 use super::options::MatchingOptions;
 use super::overlap::PredictedOverlap;
 use super::planes::{PLANE_INLIER_PX, find_planes};
-use super::putative::{PutativeMatch, putative_matches};
+use super::putative::PutativeMatch;
 use super::ransac::{Consensus, HomographySearch, NoConsensus, find_homography};
 use super::turned::{TurnConsensus, find_turned_lens};
 use crate::features::Features;
-
-/// See [`PairInput::compared_features`]. More would find smaller overlaps; the time grows with the square.
-pub(super) const COMPARED_FEATURES: usize = 4000;
-
-/// Largest number of samples drawn for the global homography. More would find pairs of which fewer matches agree.
-pub(super) const MAX_SAMPLES: usize = 6000;
 
 /// alpha of the Brown-Lowe test: a pair is joined if more than alpha + beta n_f of its n_f matches in the predicted overlap
 /// agree (Brown and Lowe, section 3.2).
@@ -167,8 +162,8 @@ pub(super) fn match_pair(
     input.check()?;
     context.check_cancelled()?;
     let PairInput { a, b, forced, compared_features } = *input;
-    let [compared_a, compared_b] = [a, b].map(|one| one.features.strongest(compared_features));
-    let putative = by_distinctiveness(putative_matches(&compared_a, &compared_b, options));
+    let compared = ComparedPair::new(a.features, b.features, compared_features, options);
+    let ComparedPair { putative, points, .. } = &compared;
     let mut pair = PairMatches {
         a: a.index,
         b: b.index,
@@ -185,20 +180,18 @@ pub(super) fn match_pair(
         return Ok(pair);
     }
     context.check_cancelled()?;
-    // Seeded by what is matched, so that the result does not depend on which other photographs there are.
-    let seed = fingerprint(a.features).rotate_left(1) ^ fingerprint(b.features);
+    let seed = compared.seed();
     let mut generator = context.generator(MatchingOptions::STAGE, seed);
-    let points = matched_points(&putative);
     let search = HomographySearch {
         inlier_px: options.inlier_px,
         max_samples: MAX_SAMPLES,
         useful_inliers: pair.needed,
         start: None,
     };
-    let found = find_homography(&points, &search, |map| input.is_plausible(map), &mut generator);
-    let turn = better_turn(input, &points, found.as_ref().ok(), seed, options, context);
+    let found = find_homography(points, &search, |map| input.is_plausible(map), &mut generator);
+    let turn = better_turn(input, points, found.as_ref().ok(), seed, options, context);
     let Some(model) = (match (turn, found) {
-        (Some(turn), _) => Model::of_turn(&turn, &points),
+        (Some(turn), _) => Model::of_turn(&turn, points),
         (None, Ok(global)) => {
             let Consensus { b_from_a, inliers } = global;
             Some(Model { map: PointMap::Plane(b_from_a), b_from_a, inliers })
@@ -219,12 +212,12 @@ pub(super) fn match_pair(
     pair.b_from_a = Some(scaled_rows(&model.b_from_a));
     input.judge(&mut pair, options);
     if pair.verdict.is_joined() {
-        let joined = JoinedPair { input, putative: &putative, points: &points, model: &model, overlap: &overlap };
+        let joined = JoinedPair { input, putative, points, model: &model, overlap: &overlap };
         let (inliers, is_known) = joined.all_inliers(options, &mut generator);
         pair.inliers = inliers.into();
         let mut generator = context.generator("matches elsewhere", seed);
         let cameras = model.cameras([a.frame, b.frame]);
-        let found = matches_elsewhere(&points, &is_known, &model.b_from_a, &cameras, b.frame, &mut generator);
+        let found = matches_elsewhere(points, &is_known, &model.b_from_a, &cameras, b.frame, &mut generator);
         pair.elsewhere = found.into_iter().map(|k| putative[k].at).collect();
     }
     Ok(pair)
@@ -325,28 +318,6 @@ impl JoinedPair<'_> {
         let of_all =
             |plane: Consensus| Consensus { inliers: plane.inliers.iter().map(|&k| left[k]).collect(), ..plane };
         planes.into_iter().map(of_all).collect()
-    }
-}
-
-/// A number that tells the features of one photograph from those of another.
-pub(super) fn fingerprint(features: &Features) -> u64 {
-    // FNV-1a over whole words, turned so that high bits count.
-    const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
-    const PRIME: u64 = 0x0000_0100_0000_01b3;
-    let words = features.points.iter().flat_map(|point| point.position.map(f64::to_bits));
-    words.fold(OFFSET, |hash, word| (hash ^ word).wrapping_mul(PRIME).rotate_left(29))
-}
-
-/// Most distinctive first.
-pub(super) fn by_distinctiveness(mut putative: Vec<PutativeMatch>) -> Vec<PutativeMatch> {
-    putative.sort_by(|j, k| j.ratio.total_cmp(&k.ratio).then(j.point_a.cmp(&k.point_a)));
-    putative
-}
-
-pub(super) fn matched_points(putative: &[PutativeMatch]) -> MatchedPoints {
-    MatchedPoints {
-        in_a: putative.iter().map(|candidate| candidate.at.in_a.into()).collect(),
-        in_b: putative.iter().map(|candidate| candidate.at.in_b.into()).collect(),
     }
 }
 

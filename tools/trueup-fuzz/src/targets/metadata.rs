@@ -2,15 +2,8 @@
 
 use trueup_io::fuzzing::{read_color_profile, read_exif_block, read_maker_note as read_note, read_xmp_packet};
 
-use super::pictures;
+use super::blocks;
 use super::work::Work;
-
-/// An XMP packet in which a drone and a sphere tell how the camera was held, as attributes and as elements.
-pub(super) const POSES: &str = "<?xpacket begin=\"\u{feff}\" id=\"W5M0MpCehiHzreSzNTczkc9d\"?>\n<x:xmpmeta xmlns:x=\"adobe:ns:meta/\">\
-<rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\"><rdf:Description \
-xmlns:drone-dji=\"http://www.dji.com/drone-dji/1.0/\" xmlns:GPano=\"http://ns.google.com/photos/1.0/panorama/\" \
-drone-dji:GimbalRollDegree=\"+1.25\" drone-dji:GimbalPitchDegree=\"-12.50\"><GPano:PosePitchDegrees>3</GPano:PosePitchDegrees>\
-<GPano:PoseRollDegrees>-4.5</GPano:PoseRollDegrees></rdf:Description></rdf:RDF></x:xmpmeta><?xpacket end=\"w\"?>";
 
 /// Apple's maker note with an acceleration vector of -1/4, -39/40 and 1/8 g: name, one entry of a directory, its values.
 fn apple_note() -> Vec<u8> {
@@ -22,7 +15,7 @@ fn apple_note() -> Vec<u8> {
     note
 }
 
-/// An EXIF block whose second directory has a maker note, in the other byte order than [`pictures::exif`].
+/// An EXIF block whose second directory has a maker note, in the other byte order than [`blocks::exif`].
 fn exif_with_note() -> Vec<u8> {
     let note = apple_note();
     let mut block = b"MM\0*\0\0\0\x08\0\x02".to_vec();
@@ -36,7 +29,7 @@ fn exif_with_note() -> Vec<u8> {
 }
 
 pub(super) fn exif_blocks() -> Vec<Vec<u8>> {
-    vec![pictures::exif(), exif_with_note()]
+    vec![blocks::exif(), exif_with_note()]
 }
 
 pub(super) fn read_exif(_: &Work, input: &[u8]) {
@@ -52,7 +45,7 @@ pub(super) fn read_maker_note(_: &Work, input: &[u8]) {
 }
 
 pub(super) fn packets() -> Vec<Vec<u8>> {
-    vec![POSES.as_bytes().to_vec()]
+    vec![blocks::POSES.as_bytes().to_vec()]
 }
 
 pub(super) fn read_xmp(_: &Work, input: &[u8]) {

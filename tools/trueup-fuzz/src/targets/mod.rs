@@ -1,5 +1,6 @@
 //! What is fuzzed: everything that reads what somebody else wrote.
 
+mod blocks;
 mod metadata;
 mod pictures;
 mod records;

@@ -13,6 +13,7 @@ use trueup_io::fuzzing::read_color_profile;
 use trueup_io::provenance::{PanoramaDescription, describe};
 use trueup_io::source::{SourceOptions, scan};
 
+use super::blocks;
 use super::work::Work;
 
 /// Side of the pictures that are changed, in pixels: little more than photographs must have, so that many are read in a
@@ -59,27 +60,12 @@ impl RowSource for Colors {
     }
 }
 
-/// An EXIF block: orientation 6, a focal length of 24 mm, GPS directions; tag, type, number and value of every field (EXIF 3.0
-/// 4.6, TIFF 6.0 section 2).
-pub(super) fn exif() -> Vec<u8> {
-    let field = |tag: u16, kind: u16, count: u32, value: u32| {
-        [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()
-    };
-    let (first, second, ratio) = (8_u32, 50_u32, 80_u32);
-    let mut block = [b"II*\0", &first.to_le_bytes()[..], &[3, 0]].concat();
-    block.extend([field(0x0112, 3, 1, 6), field(0x0131, 2, 4, 0x0061_6263), field(0x8769, 4, 1, second)].concat());
-    block.extend([0; 4]);
-    block.extend([&[2, 0][..], &field(0x920a, 5, 1, ratio), &field(0xa405, 3, 1, 24), &[0; 4]].concat());
-    block.extend([24_u32.to_le_bytes(), 1_u32.to_le_bytes()].concat());
-    block
-}
-
 /// Small pictures in a format, by their extension: with all the metadata it holds, at every depth it has.
 pub(super) fn seeds(extension: &str) -> Vec<Vec<u8>> {
     let folder = tempfile::tempdir().expect("a folder for the seeds");
     let path = folder.path().join("seed").with_extension(extension);
     let icc = ColorProfile::new_display_p3().encode().ok();
-    let full = Metadata { exif: Some(exif()), icc, xmp: Some(super::metadata::POSES.to_owned()) };
+    let full = Metadata { exif: Some(blocks::exif()), icc, xmp: Some(blocks::POSES.to_owned()) };
     let mut seeds = Vec::new();
     for (depth, metadata) in
         [(Depth::Auto, &full), (Depth::Sixteen, &full), (Depth::Float, &full), (Depth::Eight, &Metadata::default())]

@@ -1,0 +1,51 @@
+//! Two photographs whose features are compared: what every search among their matches begins from.
+
+use super::matched_points::MatchedPoints;
+use super::options::MatchingOptions;
+use super::putative::{PutativeMatch, putative_matches};
+use crate::features::Features;
+
+/// Strongest features of each photograph that are compared with all such of the other. More would find smaller overlaps; the time grows with the
+/// square.
+pub(super) const COMPARED_FEATURES: usize = 4000;
+
+/// Largest number of samples drawn for the global homography. More would find pairs of which fewer matches agree.
+pub(super) const MAX_SAMPLES: usize = 6000;
+
+/// What looks alike in two photographs.
+pub(super) struct ComparedPair<'a> {
+    features: [&'a Features; 2],
+    /// Most distinctive first.
+    pub(super) putative: Vec<PutativeMatch>,
+    /// Their places.
+    pub(super) points: MatchedPoints,
+}
+
+impl<'a> ComparedPair<'a> {
+    /// Compares the strongest `compared_features` of either.
+    pub(super) fn new(a: &'a Features, b: &'a Features, compared_features: usize, options: &MatchingOptions) -> Self {
+        let [compared_a, compared_b] = [a, b].map(|features| features.strongest(compared_features));
+        let mut putative = putative_matches(&compared_a, &compared_b, options);
+        putative.sort_by(|j, k| j.ratio.total_cmp(&k.ratio).then(j.point_a.cmp(&k.point_a)));
+        let points = MatchedPoints {
+            in_a: putative.iter().map(|candidate| candidate.at.in_a.into()).collect(),
+            in_b: putative.iter().map(|candidate| candidate.at.in_b.into()).collect(),
+        };
+        Self { features: [a, b], putative, points }
+    }
+
+    /// A seed of what is matched: draws do not depend on which other photographs there are.
+    pub(super) fn seed(&self) -> u64 {
+        let [a, b] = self.features.map(fingerprint);
+        a.rotate_left(1) ^ b
+    }
+}
+
+/// A number that tells the features of one photograph from those of another.
+fn fingerprint(features: &Features) -> u64 {
+    // FNV-1a over whole words, turned so that high bits count.
+    const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+    const PRIME: u64 = 0x0000_0100_0000_01b3;
+    let words = features.points.iter().flat_map(|point| point.position.map(f64::to_bits));
+    words.fold(OFFSET, |hash, word| (hash ^ word).wrapping_mul(PRIME).rotate_left(29))
+}
