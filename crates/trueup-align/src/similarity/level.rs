@@ -71,11 +71,21 @@ impl Say {
         (squares(down) - squares(&self.down)).max(0.0) + (down - self.down).norm_squared() * self.information
     }
 
+    /// The same of what was only expected, in squares of the scale at which it gives way.
+    fn expected_beyond(&self, down: &Vector3<f64>) -> f64 {
+        Self { information: 0.0, ..*self }.squares_beyond(down) / HELD_SCALE.powi(2)
+    }
+
     /// What is left of this say if the vertical is `down`: all of what was seen, less of what was only expected.
     fn heeded(&self, down: &Vector3<f64>) -> Self {
-        let expected = Self { information: 0.0, ..*self };
-        let beyond = expected.squares_beyond(down) / HELD_SCALE.powi(2);
-        Self { moment: self.moment * (1.0 + beyond).powi(-2), ..*self }
+        Self { moment: self.moment * (1.0 + self.expected_beyond(down)).powi(-2), ..*self }
+    }
+
+    /// The squares of `down` beyond its own that are minimized: of what was only expected, no more than the square of the scale.
+    fn cost(&self, down: &Vector3<f64>) -> f64 {
+        let expected = self.expected_beyond(down);
+        let seen = (down - self.down).norm_squared() * self.information;
+        HELD_SCALE.powi(2) * expected / (1.0 + expected) + seen
     }
 
     /// Information about turns of `down` along the columns of `basis`.
@@ -128,8 +138,7 @@ impl<'a> CameraLevel<'a> {
         });
         let says: Vec<Say> = [Some(cameras), gravity].into_iter().flatten().collect();
         let has_gravity = gravity.is_some();
-        let start = gravity.map_or(level, |gravity| gravity.down);
-        let down = if has_gravity { combined(&says, &start) } else { level };
+        let down = if has_gravity { combined(&says) } else { level };
         Self { rotations, straightened: straighten(rotations), down, has_gravity, says }
     }
 
@@ -180,7 +189,7 @@ impl<'a> CameraLevel<'a> {
             information: deviation.powi(-2),
         }];
         says.extend_from_slice(&self.says);
-        let down = combined(&says, lines);
+        let down = combined(&says);
         let evidence = evidence(&says, &down);
         (down, evidence)
     }
@@ -194,8 +203,17 @@ fn roll_variance(rotations: &[Matrix3<f64>], level: &Vector3<f64>) -> f64 {
     (squares + EXPECTED_COUNT * EXPECTED_ROLL_DEG.to_radians().powi(2)) / (free + EXPECTED_COUNT)
 }
 
-/// The direction of least squares, from `start`.
-fn combined(says: &[Say], start: &Vector3<f64>) -> Vector3<f64> {
+/// The direction of least squares. As what was only expected gives way, there is one near what was seen and one near what was expected: steps begin at
+/// what each say means by itself, and end where the cost is least.
+fn combined(says: &[Say]) -> Vector3<f64> {
+    let cost = |down: &Vector3<f64>| says.iter().map(|say| say.cost(down)).sum::<f64>();
+    let ends = says.iter().map(|say| descended(says, &say.down)).map(|down| (cost(&down), down));
+    let least = ends.min_by(|one, other| one.0.total_cmp(&other.0));
+    least.map_or_else(Vector3::y, |(_, down)| down)
+}
+
+/// Where steps of least squares lead from `start`.
+fn descended(says: &[Say], start: &Vector3<f64>) -> Vector3<f64> {
     let mut down = *start;
     for _ in 0..STEPS {
         let basis = tangent(&down);
@@ -299,6 +317,19 @@ mod tests {
         assert!(level.down.angle(&Vector3::y()) < 1e-3, "{}", level.down);
         let shares: Vec<f64> = level.evidence().iter().map(|one| one.share).collect();
         assert!(shares[0] < 1e-3 && shares[1] > 0.999, "{shares:?}");
+    }
+
+    /// Lines 14 degrees from the cameras' level. Cameras whose level is sure to sqrt((2 e^2 / 4) / 2) = 1 degree cost at most 4, Geman and McClure's
+    /// scale squared; at their own level, lines that are sure to 10 degrees cost (14 / 10)^2, such as are sure to 3 (14 / 3)^2.
+    #[test]
+    fn cameras_give_way_to_what_is_surer_than_their_distance_alone() {
+        let rotations = all_round(0.0);
+        let level = CameraLevel::new(&rotations, 0.0, None);
+        let lines = rotation_about_x(14_f64.to_radians()) * Vector3::y();
+        let down = |deviation_deg: f64| level.with_lines(&lines, deviation_deg.to_radians(), 4).0;
+        let from_cameras = |deviation_deg: f64| down(deviation_deg).angle(&Vector3::y()).to_degrees();
+        assert!(from_cameras(10.0) < 0.5, "{}", from_cameras(10.0));
+        assert!(from_cameras(3.0) > 13.0, "{}", from_cameras(3.0));
     }
 
     #[test]

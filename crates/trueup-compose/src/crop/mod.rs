@@ -71,21 +71,28 @@ impl Framing<'_> {
         match (self.known, self.options.crop, layout.period) {
             (Some(known), _, _) => Some(known.clone()),
             (None, Crop::None, _) => Some(Frame::Whole),
-            (None, Crop::Rectangle, None) => Some(self.frame(Some(self.coverage.largest_rectangle()))),
-            (None, Crop::Rectangle, Some(_)) => Some(self.frame(Some(self.coverage.longest_whole_rows()))),
+            (None, Crop::Rectangle, _) => Some(self.frame(Some(self.largest(layout)))),
             (None, Crop::Auto, _) => None,
+        }
+    }
+
+    /// What keeps most of what is covered, whatever that shows.
+    fn largest(&self, layout: &CanvasLayout) -> Rectangle {
+        match layout.period {
+            None => self.coverage.largest_rectangle(),
+            Some(_) => self.coverage.longest_whole_rows(),
         }
     }
 
     /// The frame of a panorama that is seen in `cells`.
     pub(crate) fn of_cells(&self, cells: &Cells, layout: &CanvasLayout) -> Frame {
         let enough = self.options.min_kept * self.coverage.area() as f64;
-        // A thing that ends in the picture is better than ragged borders.
-        let rectangle = [false, true].into_iter().find_map(|may_end| {
-            auto::rectangle(cells, layout, self.coverage, may_end)
-                .filter(|rectangle| self.coverage.area_within(rectangle) as f64 >= enough)
-        });
-        self.frame(rectangle)
+        let is_enough = |kept: &Rectangle| self.coverage.area_within(kept) as f64 >= enough;
+        // A thing that ends in the picture is better than ragged borders; so is one that is cut.
+        let of_things = [false, true].into_iter();
+        let of_things = of_things.filter_map(|may_end| auto::rectangle(cells, layout, self.coverage, may_end));
+        let mut rectangles = of_things.chain(std::iter::once_with(|| self.largest(layout)));
+        self.frame(rectangles.find(is_enough))
     }
 
     fn frame(&self, rectangle: Option<Rectangle>) -> Frame {
