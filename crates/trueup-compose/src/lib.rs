@@ -29,6 +29,7 @@ mod bulk;
 mod coverage;
 mod deformed_grid;
 mod distance;
+mod handed_over;
 mod ignored;
 mod kernel;
 mod label;

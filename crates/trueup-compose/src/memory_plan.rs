@@ -4,40 +4,22 @@
 use std::sync::Arc;
 
 use trueup_core::memory::{bytes_in_words, check_room};
-use trueup_core::scratch::{NoScratch, ScratchFile, ScratchSpace};
+use trueup_core::scratch::{ScratchFile, ScratchSpace};
 use trueup_core::source::PhotographSource;
 use trueup_core::{Error, Result};
 
 use crate::layout::{CanvasLayout, Placed};
-use crate::render::RenderHelpers;
 use crate::store::{CanvasBlocks, Pixel, PixelStore, SumPixel};
 
 /// What composing may take.
 #[derive(Clone, Copy)]
-pub struct Resources<'a> {
+pub(crate) struct Allowed<'a> {
     /// Bytes of memory for the photographs, the canvas and all that is made on the way.
-    pub memory: usize,
-    /// Bytes that may be taken where `memory` is too little to compose at all; `memory` itself if that is the user's word and the program takes no
-    /// more beside than it is counted with.
-    pub ceiling: usize,
+    pub(crate) memory: usize,
+    /// Bytes that may be taken where `memory` is too little to compose at all.
+    pub(crate) ceiling: usize,
     /// Where the canvas goes if it does not fit.
-    pub scratch: &'a dyn ScratchSpace,
-    /// Others who do a part of the work, if there are any.
-    pub helpers: Option<&'a dyn RenderHelpers>,
-}
-
-impl std::fmt::Debug for Resources<'_> {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { memory, ceiling, .. } = self;
-        formatter.debug_struct("Resources").field("memory", memory).field("ceiling", ceiling).finish_non_exhaustive()
-    }
-}
-
-impl Resources<'static> {
-    /// Everything is held in memory, however much that is.
-    pub fn unlimited() -> Self {
-        Self { memory: usize::MAX, ceiling: usize::MAX, scratch: &NoScratch, helpers: None }
-    }
+    pub(crate) scratch: &'a dyn ScratchSpace,
 }
 
 /// Where something begins that goes to the scratch file.
@@ -76,17 +58,17 @@ const DECODING: usize = 2;
 const AT_ONE_PLACE: usize = 4;
 
 impl MemoryPlan {
-    /// Divides `resources` for one canvas; opens the scratch file if there is to be one.
+    /// Divides what is `allowed` for one canvas; opens the scratch file if there is to be one.
     ///
     /// # Errors
     /// [`Error::Limits`] with the numbers if there is too little memory or too little room on the disk.
-    pub(crate) fn new(needs: &MemoryNeeds, resources: &Resources<'_>) -> Result<Self> {
+    pub(crate) fn new(needs: &MemoryNeeds, allowed: &Allowed<'_>) -> Result<Self> {
         let least = needs.least();
-        if least > resources.ceiling {
-            return Err(needs.refusal(resources.ceiling));
+        if least > allowed.ceiling {
+            return Err(needs.refusal(allowed.ceiling));
         }
         let work = &needs.work;
-        let memory = resources.memory.max(least);
+        let memory = allowed.memory.max(least);
         // Half of what is left may be canvas.
         let left = memory - least;
         let in_memory = needs.canvas() <= left / 2;
@@ -108,7 +90,7 @@ impl MemoryPlan {
         let on_disk = if in_memory { 0 } else { canvas_bytes };
         let total = on_disk + if hold_levels { 0 } else { work.coarse_levels as u64 };
         let file: Option<Arc<dyn ScratchFile>> =
-            if total > 0 { Some(Arc::from(resources.scratch.create(total)?)) } else { None };
+            if total > 0 { Some(Arc::from(allowed.scratch.create(total)?)) } else { None };
         if let Some(file) = file.as_deref().filter(|_| on_disk > 0) {
             // Its last tiles may never be finished, and are read all the same.
             file.write_at(&[0], on_disk - 1)?;
@@ -119,7 +101,7 @@ impl MemoryPlan {
             coarse_levels: place.filter(|_| !hold_levels),
             file: file.filter(|_| !in_memory),
             photographs,
-            most_photographs: photographs.saturating_add(resources.ceiling.saturating_sub(memory)),
+            most_photographs: photographs.saturating_add(allowed.ceiling.saturating_sub(memory)),
             at_a_time: 1 + more,
             sums,
         })

@@ -13,6 +13,7 @@ mod levels;
 mod loaded;
 mod needs;
 mod order;
+mod region;
 mod shown;
 #[cfg(test)]
 mod tests;
@@ -27,24 +28,26 @@ use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
 use crate::coverage::Rectangle;
+use crate::handed_over::not_asked_for;
 use crate::label::Label;
 use crate::layout::Unrolled;
 use crate::light::{Correction, LocalExposure};
 use crate::memory_plan::MemoryPlan;
 use crate::pyramid::{PyramidPlane, first_level, tile_side};
-use crate::render::{FinishedRegion, FinishedTile, Region, RegionWork, RenderHelpers, not_asked_for};
 use crate::render_options::RenderOptions;
 use crate::seam::Seams;
 use crate::small_views::{CoarseLevels, DecodedPhotographs, small_size};
 use crate::store::{Block, PixelStore, RootPixel};
 use crate::warped::{Resampling, SamplingMemory};
 use loaded::{LoadedPhotographs, PhotographLoader};
+use region::FinishedTile;
 use shown::ShownWhere;
 use tile::BlendTile;
 use work::{BlendWork, BlendedLevels, TILES_AT_ONCE};
 
 pub(crate) use levels::WholeLevels;
 pub(crate) use needs::needed_bytes;
+pub use region::{FinishedRegion, Region, RegionOf, RegionWork, TakeRegion};
 
 /// What is blended.
 pub(crate) struct BlendInput<'a> {
@@ -127,14 +130,14 @@ impl<'a> Blending<'a> {
         Ok(pixels)
     }
 
-    /// The same, where `helpers` finish regions of the canvas.
+    /// The same, where others finish regions of the canvas: `finish` has as many of them finished as it is told, each by [`finish_region`].
     ///
     /// # Errors
-    /// Those of `helpers`; [`trueup_core::Error::Input`] if what they give cannot be; those of a scratch file.
+    /// Those of `finish`; [`trueup_core::Error::Input`] if what they give cannot be; those of a scratch file.
     pub(crate) fn finish_elsewhere(
         self,
         parts: &[Rectangle],
-        helpers: &dyn RenderHelpers,
+        finish: impl FnOnce(&RegionWork, usize, RegionOf<'_>, TakeRegion<'_>) -> Result<()>,
         context: &StageContext,
     ) -> Result<PixelStore<RootPixel>> {
         let Self { input, work } = &self;
@@ -160,7 +163,7 @@ impl<'a> Blending<'a> {
             };
             Ok(Region { parts: parts.clone(), own: shown.iter().map(own).collect::<Result<_>>()? })
         };
-        helpers.finish(&common, regions.len(), &region, &mut |number, finished: FinishedRegion| {
+        finish(&common, regions.len(), &region, &mut |number, finished: FinishedRegion| {
             context.check_cancelled()?;
             if done.get(number) != Some(&false) {
                 return Err(not_asked_for());

@@ -162,7 +162,7 @@ fn with_work<T>(
     let levels = WholeLevels { first_level, above: 2 };
     let unrolled = Unrolled::new(&layout, first_level, Some(levels.above)).expect("few");
     let needs = MemoryNeeds::new(&layout, &memory, needed_bytes(&unrolled, Some(levels)));
-    let plan = MemoryPlan::new(&needs, &Resources::unlimited()).expect("no limit");
+    let plan = MemoryPlan::new(&needs, &Resources::unlimited().allowed()).expect("no limit");
     let input = SmallViewsInput {
         unrolled: &unrolled,
         corrections: &corrections,

@@ -4,6 +4,7 @@
 mod ahead;
 mod auto;
 mod cells;
+mod cut;
 mod search;
 mod smooth;
 #[cfg(test)]

@@ -9,22 +9,22 @@ mod average;
 mod checked;
 mod divided;
 mod fill;
+mod helpers;
 mod input;
 mod layer;
 mod panorama;
 mod poles;
+mod resources;
 
-pub use crate::memory_plan::Resources;
+pub use crate::blend::{FinishedRegion, Region, RegionOf, RegionWork, TakeRegion};
 pub use crate::render_options::{Blend, Interpolation, Look, RenderOptions};
-pub use divided::{
-    FinishedRegion, Region, RegionOf, RegionWork, RenderHelpers, SmallWork, TakeRegion, TakeSmall, finish_region,
-    make_small,
-};
+pub use crate::small_views::TakeSmall;
+pub use divided::{finish_region, make_small};
+pub use helpers::{RenderHelpers, SmallWork};
 pub use input::RenderInput;
 pub use layer::{Layer, LayerRows, layer, layer_rows, layer_size};
 pub use panorama::Panorama;
-
-pub(crate) use divided::{FinishedTile, not_asked_for};
+pub use resources::Resources;
 
 use trueup_core::options::StageOptions;
 use trueup_core::source::PhotographSource;
@@ -203,7 +203,7 @@ impl Composing<'_> {
         let photographs = &ByResponse::new(photographs, corrections)?;
         let needs = memory_needs(layout, photographs, options)?;
         let needs = if holding == Holding::APart { needs.of_a_part() } else { needs };
-        let plan = &MemoryPlan::new(&needs, resources)?;
+        let plan = &MemoryPlan::new(&needs, &resources.allowed())?;
         let local = photographs.local_exposure(layout, options.look);
         let corrections = photographs.corrections();
         work(&Composing { layout, corrections, local: local.as_ref(), photographs, plan })
@@ -235,7 +235,11 @@ impl Composing<'_> {
             SmallViewsInput { unrolled, corrections, local, photographs, view_levels, first_level, border, plan };
         let small = match helpers {
             None => small_views::run(&input, context)?,
-            Some(helpers) => small_views::run_elsewhere(&input, helpers, context)?,
+            Some(helpers) => {
+                let work = SmallWork { border: ahead.clone() };
+                let make_small = |positions: &[usize], take: TakeSmall<'_>| helpers.make_small(&work, positions, take);
+                small_views::run_elsewhere(&input, make_small, context)?
+            }
         };
         let SmallViews { views, size, coarse_levels, border, decoded } = small;
         let seams = match views.len() {
@@ -267,7 +271,12 @@ impl Composing<'_> {
         let parts = to_finish(layout, framing, frame.as_ref());
         let pixels = match helpers {
             None => blending.finish(&parts, context)?,
-            Some(helpers) => blending.finish_elsewhere(&parts, helpers, context)?,
+            Some(helpers) => {
+                let finish = |work: &RegionWork, count: usize, region: RegionOf<'_>, take: TakeRegion<'_>| {
+                    helpers.finish(work, count, region, take)
+                };
+                blending.finish_elsewhere(&parts, finish, context)?
+            }
         };
         context.progress().finish(STAGE);
         Ok((pixels, seams, frame))

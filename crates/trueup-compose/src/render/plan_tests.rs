@@ -24,7 +24,7 @@ fn plan(memory: usize, ceiling: usize, blend: Blend) -> Result<MemoryPlan> {
     let disk = RamDisk::default();
     let resources = Resources { memory, ceiling, scratch: &disk, helpers: None };
     let options = RenderOptions { blend, ..RenderOptions::default() };
-    MemoryPlan::new(&memory_needs(&layout(20), &Memory(Vec::new()), &options)?, &resources)
+    MemoryPlan::new(&memory_needs(&layout(20), &Memory(Vec::new()), &options)?, &resources.allowed())
 }
 
 #[test]

@@ -19,11 +19,11 @@ use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
 use crate::crop::{BorderDeviations, CellsAhead};
+use crate::handed_over::not_asked_for;
 use crate::ignored::ShownElsewhere;
 use crate::layout::{Placed, TURNS, Unrolled};
 use crate::light::{Correction, LocalExposure, PhotographLight};
 use crate::memory_plan::MemoryPlan;
-use crate::render::{RenderHelpers, SmallWork, not_asked_for};
 use crate::render_options::RenderOptions;
 use crate::transfer_curve::EncodeRoots;
 use crate::warped::{Resampling, WarpedPhotograph, check_photograph};
@@ -123,13 +123,16 @@ pub(crate) fn run(input: &SmallViewsInput<'_>, context: &StageContext) -> Result
     Ok(all)
 }
 
-/// The same, where the photographs are made small by others.
+/// Takes what a photograph became, with its position among [`placed`](crate::layout::CanvasLayout::placed).
+pub type TakeSmall<'a> = &'a mut dyn FnMut(usize, MadeSmall) -> Result<()>;
+
+/// The same, where the photographs are made small by others: `make_small` has those at the positions that it is told made so.
 ///
 /// # Errors
-/// Those of `helpers`; [`trueup_core::Error::Input`] if what they give cannot be; those of a scratch file.
+/// Those of `make_small`; [`trueup_core::Error::Input`] if what they give cannot be; those of a scratch file.
 pub(crate) fn run_elsewhere(
     input: &SmallViewsInput<'_>,
-    helpers: &dyn RenderHelpers,
+    make_small: impl FnOnce(&[usize], TakeSmall<'_>) -> Result<()>,
     context: &StageContext,
 ) -> Result<SmallViews> {
     let unrolled = input.unrolled;
@@ -137,8 +140,7 @@ pub(crate) fn run_elsewhere(
     let positions: Vec<usize> = (0..unrolled.original_layout().placed.len()).collect();
     let mut waiting: Vec<Option<MadeSmall>> = positions.iter().map(|_| None).collect();
     let mut next = 0;
-    let work = SmallWork { border: input.border.map(|border| border.cells.clone()) };
-    helpers.make_small(&work, &positions, &mut |position, made| {
+    make_small(&positions, &mut |position, made| {
         context.check_cancelled()?;
         let is_wanted = waiting.get(position).is_some_and(Option::is_none) && position >= next;
         if !(is_wanted && made.fits(unrolled.placements(position).count())) {

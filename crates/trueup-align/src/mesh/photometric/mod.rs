@@ -11,6 +11,7 @@
 
 mod cell;
 mod colors;
+mod equations;
 mod options;
 mod overlap;
 mod pyramid;
@@ -24,8 +25,9 @@ use super::current_grids::CurrentGrids;
 use super::normal_equations::NormalEquations;
 use crate::evidence;
 use crate::match_points::OverlapWarp;
+use equations::OverlapEquations;
 pub use options::PhotometricOptions;
-use overlap::{OverlapEquations, PhotometricOverlap};
+use overlap::PhotometricOverlap;
 pub use pyramid::GrayPyramid;
 pub(super) use pyramid::LEVELS;
 
