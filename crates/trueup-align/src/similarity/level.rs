@@ -158,8 +158,7 @@ impl<'a> CameraLevel<'a> {
             (false, false) => return None,
         };
         let squares: f64 = self.says.iter().map(|say| say.squares_beyond(down)).sum();
-        let squared_rolls = self.rotations.iter().map(|rotation| (rotation * down).x.asin().powi(2));
-        let rolls = (squared_rolls.sum::<f64>() / self.rotations.len() as f64).sqrt();
+        let rolls = mean_square_roll(self.rotations, down).sqrt();
         let pitch_is_untold = !self.has_gravity && self.rotations.len() == 2;
         Some(CameraAngle {
             angle: own.angle(down),
@@ -193,6 +192,12 @@ impl<'a> CameraLevel<'a> {
         let evidence = evidence(&says, &down);
         (down, evidence)
     }
+}
+
+/// Mean square in radians of the rolls of cameras if the vertical is `down`.
+pub(super) fn mean_square_roll(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> f64 {
+    let squares = rotations.iter().map(|rotation| (rotation * down).x.asin().powi(2));
+    squares.sum::<f64>() / rotations.len() as f64
 }
 
 /// Variance of the cameras' rolls about `level`, of which two angles were fitted; with what is expected of photographers, which few

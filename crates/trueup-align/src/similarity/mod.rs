@@ -94,7 +94,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     let level = CameraLevel::new(&rotations, options.pitch_prior, gravity);
     let straightened = level.straightened.down;
     let unguided = |told: Vec<LevelEvidence>| {
-        Guidance::none(input.cameras.len(), gate::allowed_divergence(input.cameras.len(), options), told)
+        Guidance::none(input.cameras.len(), gate::allowed_divergence(input.cameras.len(), None, options), told)
     };
     let by_overlaps =
         |upright: Upright| Guided { guidance: unguided(Vec::new()), upright: Some(upright), level: level.down };

@@ -72,7 +72,8 @@ trueup_core::options! {
         /// Largest divergence of the vanishing directions. Raise it where lines are right and refused, lower it where
         /// directions that are none guide the panorama.
         max_divergence: f64 = 0.10, between(0.0, 1e3), "";
-        /// The same with three photographs or fewer, which agree by chance more easily.
+        /// The same with three photographs or fewer, which agree by chance more easily; more where their lines stand out by more
+        /// than 6 standard deviations.
         max_divergence_few: f64 = 0.02, between(0.0, 1e3), "";
         /// Whether photographs that disagree are searched again near the dominant directions. Turn it off to keep to
         /// the published method.

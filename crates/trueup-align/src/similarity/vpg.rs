@@ -12,7 +12,7 @@ use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
 use super::jackknife::{axis_deviations, deviation_by_sectors};
 use super::joint::{self, AxisWeights, LineVote, Refinement};
-use super::level::CameraLevel;
+use super::level::{CameraLevel, mean_square_roll};
 use super::options::{GateMode, SimilarityOptions};
 use super::prior::{Guidance, VerticalSpread};
 use super::signed_permutation::{match_triad, triad_residual};
@@ -77,13 +77,14 @@ pub(super) fn guide(
     let count = input.cameras.len();
     let mut scene = SceneDirections::new(input, level, options);
     context.check_cancelled()?;
-    let mut guidance = Guidance::none(count, allowed_divergence(count, options), level.evidence());
+    let mut guidance = Guidance::none(count, allowed_divergence(count, None, options), level.evidence());
     let mut generator = context.generator(SimilarityOptions::STAGE, 0);
     let cut = if options.as_printed.dominant { f64::INFINITY } else { options.rejection };
     let dominant = dominant_frame(&scene.triads, cut, &mut generator);
     context.check_cancelled()?;
     let pooled = options.pooled_search.then(|| search_frames(&scene.vote, &level.down)).flatten();
     guidance.significance = pooled.as_ref().map(|pooled| pooled.significance);
+    guidance.threshold = allowed_divergence(count, guidance.significance, options);
     guidance.failed_clause = match &dominant {
         Some(dominant) => scene.judge(dominant, &mut guidance),
         None => Some("no photograph has vanishing directions".to_owned()),
@@ -186,6 +187,7 @@ impl<'a> SceneDirections<'a> {
                 true => 0.0,
                 false => magnitudes.get(magnitudes.len().saturating_sub(1) / 2).copied().unwrap_or(f64::INFINITY),
             },
+            rolls: (!self.level.has_gravity).then(|| mean_square_roll(self.level.rotations, &down).sqrt()),
         };
         guidance.divergence = Some(evidence.divergence).filter(|divergence| divergence.is_finite());
         guidance.inlier_ratio = inliers.len() as f64 / photographs as f64;

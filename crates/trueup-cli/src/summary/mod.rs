@@ -199,7 +199,9 @@ fn flat_scene(lines: &mut LabeledLines, scene: &FlatSceneRecord) {
 /// Whether vanishing points guided the panorama, with the divergence against its threshold; or the one reason why not.
 fn upright(project: &Project) -> String {
     let manhattan = &project.manhattan;
-    let trusted = format!("up to {} is trusted", manhattan.threshold);
+    // Without the zeros at its end.
+    let threshold = (1000.0 * manhattan.threshold).round() / 1000.0;
+    let trusted = format!("up to {threshold} is trusted");
     let divergence = manhattan.divergence.map(|divergence| format!("divergence {divergence:.3}, {trusted}"));
     let slope = manhattan
         .slope_deg
