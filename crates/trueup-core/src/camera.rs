@@ -121,6 +121,11 @@ impl Camera {
         Some(ProjectionDerivatives { pixel, by_bearing: by_ray * self.focal_px, by_intrinsics })
     }
 
+    /// How the pixel of a bearing moves with the bearing's three entries: [`Self::projection_derivatives`] without the intrinsics.
+    pub fn projection_by_bearing(&self, bearing: Vector3<f64>) -> Option<Matrix2x3<f64>> {
+        Some(self.lens.by_ray(bearing)? * self.focal_px)
+    }
+
     /// How far the bearing of `pixel` moves, to first order, as the pixel moves by `step`.
     pub fn bearing_change(&self, pixel: Vector2<f64>, step: Vector2<f64>) -> Vector3<f64> {
         if self.lens.is_pinhole() {

@@ -32,7 +32,7 @@ pub(super) trait LeastSquares {
     fn moved(&self, state: &Self::State, step: &faer::Mat<f64>) -> Self::State;
 }
 
-/// Refines `state` until its cost settles.
+/// Refines `state` until its cost settles: until a step hardly decreases it, or fails and would hardly by its model.
 ///
 /// # Errors
 /// [`trueup_core::Error::Cancelled`].
@@ -56,6 +56,10 @@ pub(super) fn minimize<P: LeastSquares>(problem: &P, mut state: P::State, contex
                 damping = (damping * 0.1).max(f64::EPSILON);
                 break;
             }
+            // More damping promises less still.
+            if promised(&equations, &step) < SETTLED * cost {
+                break;
+            }
             damping *= 10.0;
         }
         if decrease < SETTLED {
@@ -63,6 +67,11 @@ pub(super) fn minimize<P: LeastSquares>(problem: &P, mut state: P::State, contex
         }
     }
     Ok(state)
+}
+
+/// The most by which the model says that a damped step decreases the cost: -2 g s - s N s is no more than -2 g s.
+fn promised(equations: &NormalEquations, step: &faer::Mat<f64>) -> f64 {
+    -2.0 * (0..step.nrows()).map(|k| equations.gradient[(k, 0)] * step[(k, 0)]).sum::<f64>()
 }
 
 /// Solves (N + damping diag N) step = -gradient; unknowns without any data stay where they are. `None` if not positive
