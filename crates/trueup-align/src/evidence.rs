@@ -7,6 +7,7 @@
 //! what is estimated says in a Wiener filter.
 
 use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
 
 /// Misalignment, common to neighboring matches of a pair, from which on they are believed fully, pixels per axis; with
 /// less the share falls with its square.
@@ -45,9 +46,8 @@ pub(crate) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
     const NEIGHBORS: usize = 12;
     /// Products with which a neighborhood is drawn to the mean of all.
     const DRAWN: f64 = 24.0;
-    let mut overall = CommonSum::default();
     let around: Vec<CommonSum> = evidence
-        .iter()
+        .par_iter()
         .map(|one| {
             let mut near: Vec<(f64, &OverlapGap)> = evidence
                 .iter()
@@ -68,11 +68,14 @@ pub(crate) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
                     }
                 }
             }
-            overall.products += sum.products;
-            overall.units += sum.units;
             sum
         })
         .collect();
+    let mut overall = CommonSum::default();
+    for sum in &around {
+        overall.products += sum.products;
+        overall.units += sum.units;
+    }
     if overall.units == 0.0 {
         return evidence.iter().map(OverlapGap::beyond_noise).collect();
     }

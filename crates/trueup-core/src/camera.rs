@@ -121,6 +121,11 @@ impl Camera {
         Some(ProjectionDerivatives { pixel, by_bearing: by_ray * self.focal_px, by_intrinsics })
     }
 
+    /// How the pixel of a bearing moves with the bearing's three entries: [`Self::projection_derivatives`] without the intrinsics.
+    pub fn projection_by_bearing(&self, bearing: Vector3<f64>) -> Option<Matrix2x3<f64>> {
+        Some(self.lens.by_ray(bearing)? * self.focal_px)
+    }
+
     /// How far the bearing of `pixel` moves, to first order, as the pixel moves by `step`.
     pub fn bearing_change(&self, pixel: Vector2<f64>, step: Vector2<f64>) -> Vector3<f64> {
         if self.lens.is_pinhole() {
@@ -180,6 +185,26 @@ mod tests {
         let place = camera.project(Vector3::new(0.2, 0.0, 1.0)).expect("in front");
         assert!((place - Vector2::new(326.0 + 99.6, 236.0)).norm() < 1e-9, "{place}");
         assert_eq!(pinhole.through(&PlacedLens::default()), pinhole);
+    }
+
+    /// Against differences over steps of a millionth, with all terms of a lens, and of a fisheye.
+    #[test]
+    fn pixels_move_with_bearings_as_the_derivatives_say() {
+        for projection in [LensProjection::Rectilinear, LensProjection::Equidistant] {
+            let terms = LensTerms { projection, radial: [-0.1, 0.02, 0.0, 0.0], tangential: [0.003, -0.002] };
+            let mut camera = Camera::new(500.0, 640.0, 480.0, &Matrix3::identity());
+            camera.lens = Lens::new(terms);
+            let bearing = Vector3::new(0.3, -0.2, 1.1);
+            let found = camera.projection_by_bearing(bearing).expect("in front");
+            for axis in 0..3 {
+                let step = Vector3::ith(axis, 1e-6);
+                let [before, after] =
+                    [bearing - step, bearing + step].map(|bearing| camera.project(bearing).expect("in front"));
+                assert!((found.column(axis) - (after - before) / 2e-6).norm() < 1e-5, "{projection:?} {found}");
+            }
+        }
+        let pinhole = Camera::new(500.0, 640.0, 480.0, &Matrix3::identity());
+        assert!(pinhole.projection_by_bearing(Vector3::new(0.0, 0.0, -1.0)).is_none());
     }
 
     #[test]

@@ -200,10 +200,19 @@ impl Lens {
         let powers = [1, 2, 3, 4].map(|power| held.powi(power));
         Some(LensDerivatives {
             place: self.distorted(undistorted),
-            by_ray: self.by_undistorted(undistorted) * self.terms.projection.by_ray(ray, undistorted),
+            by_ray: self.by_ray_of(ray, undistorted),
             by_radial: undistorted * SMatrix::<f64, 1, 4>::from_row_slice(&powers),
             by_tangential: Matrix2::new(2.0 * x * y, square + 2.0 * x * x, square + 2.0 * y * y, 2.0 * x * y),
         })
+    }
+
+    /// How the place of a ray moves with the ray's three entries; `None` as [`Self::place`].
+    pub fn by_ray(&self, ray: Vector3<f64>) -> Option<Matrix2x3<f64>> {
+        self.terms.projection.place(ray).map(|undistorted| self.by_ray_of(ray, undistorted))
+    }
+
+    fn by_ray_of(&self, ray: Vector3<f64>, undistorted: Vector2<f64>) -> Matrix2x3<f64> {
+        self.by_undistorted(undistorted) * self.terms.projection.by_ray(ray, undistorted)
     }
 
     /// Factor of the radius r by the radial terms, slope and curvature of the distorted radius.

@@ -7,7 +7,7 @@
 //! # Departures
 //! The unknown of a focal length is its logarithm, so that steps are relative and the sign is safe.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use trueup_core::camera::{Camera, INTRINSICS};
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
@@ -193,25 +193,40 @@ impl BundleAdjustment<'_> {
     }
 
     /// The quadratic model of every pair in the unknowns that `model` leaves free, and with lenses of every cluster of edges.
-    pub(super) fn terms<const LOCAL: usize>(
+    fn terms<const LOCAL: usize>(
+        &self,
+        cameras: &[Camera],
+        model: &IntrinsicsModel,
+        huber_px: f64,
+    ) -> Vec<PairTerm<LOCAL>> {
+        let mut terms = self.match_terms(cameras, model, huber_px);
+        if LOCAL == LENS_LOCAL {
+            terms.extend(self.curve_terms(cameras, huber_px));
+        }
+        terms
+    }
+
+    /// The quadratic model of every pair in the unknowns that `model` leaves free.
+    pub(super) fn match_terms<const LOCAL: usize>(
         &self,
         cameras: &[Camera],
         model: &IntrinsicsModel,
         huber_px: f64,
     ) -> Vec<PairTerm<LOCAL>> {
         let of_pair = |pair| PairTerm::new(cameras, pair, &self.columns(pair, model), huber_px);
-        let mut terms: Vec<PairTerm<LOCAL>> = self.observations.pairs.par_iter().map(of_pair).collect();
-        if LOCAL == LENS_LOCAL {
-            let of_curves = self.curves.clusters.par_iter().map(|cluster| {
-                let CurveTerm { normal, gradient } = CurveTerm::new(cameras, cluster, huber_px);
-                let mut term = PairTerm::<LOCAL> { normal: SMatrix::zeros(), gradient: SVector::zeros() };
-                term.normal.view_mut((6, 6), (INTRINSICS, INTRINSICS)).copy_from(&normal);
-                term.gradient.rows_mut(6, INTRINSICS).copy_from(&gradient);
-                term
-            });
-            terms.par_extend(of_curves);
-        }
-        terms
+        self.observations.pairs.par_iter().map(of_pair).collect()
+    }
+
+    /// The quadratic model of every cluster of edges, whose photograph stands for the first of a pair with lenses.
+    pub(super) fn curve_terms<const LOCAL: usize>(&self, cameras: &[Camera], huber_px: f64) -> Vec<PairTerm<LOCAL>> {
+        let of_cluster = |cluster| {
+            let CurveTerm { normal, gradient } = CurveTerm::new(cameras, cluster, huber_px);
+            let mut term = PairTerm::<LOCAL>::zero();
+            term.normal.view_mut((6, 6), (INTRINSICS, INTRINSICS)).copy_from(&normal);
+            term.gradient.rows_mut(6, INTRINSICS).copy_from(&gradient);
+            term
+        };
+        self.curves.clusters.par_iter().map(of_cluster).collect()
     }
 
     /// What the matches cost.

@@ -6,7 +6,7 @@
 //! and so are the edges in one part of a photograph, which are bent together where they are of one thing.
 
 use faer::linalg::solvers::Solve;
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, SVector};
 
 use super::bundle::{BundleAdjustment, Parameters};
 use super::intrinsics::{FOCAL, IntrinsicsModel, LensState};
@@ -43,14 +43,19 @@ impl LensEvidence {
         huber_px: f64,
     ) -> Option<Self> {
         let photographs = problem.priors.len();
-        let mut terms: Vec<PairTerm<LENS_LOCAL>> = problem.terms(&parameters.cameras(problem.priors), model, huber_px);
-        let asked = match witness {
-            Witness::Matches => 0..problem.observations.pairs.len(),
-            Witness::Edges => problem.observations.pairs.len()..terms.len(),
+        let cameras = parameters.cameras(problem.priors);
+        let (pairs, clusters) = (problem.observations.pairs.len(), problem.curves.clusters.len());
+        let silent = |count: usize| std::iter::repeat_with(PairTerm::<LENS_LOCAL>::zero).take(count);
+        let (terms, asked): (Vec<_>, _) = match witness {
+            Witness::Matches => {
+                let told = problem.match_terms(&cameras, model, huber_px);
+                (told.into_iter().chain(silent(clusters)).collect(), 0..pairs)
+            }
+            Witness::Edges => {
+                let told = problem.curve_terms(&cameras, huber_px);
+                (silent(pairs).chain(told).collect(), pairs..pairs + clusters)
+            }
         };
-        for (_, silent) in terms.iter_mut().enumerate().filter(|(place, _)| !asked.contains(place)) {
-            *silent = PairTerm { normal: SMatrix::zeros(), gradient: SVector::zeros() };
-        }
         let pattern = problem.pattern(model).ok()?;
         let equations = pattern.equations(&terms, &problem.pulls(parameters, model))?;
         let factor = equations.factor(0.0)?;

@@ -56,6 +56,11 @@ pub(super) fn pair_distances(cameras: &[Camera], pair: &PairObservations) -> Vec
 }
 
 impl<const LOCAL: usize> PairTerm<LOCAL> {
+    /// The model of a cost that says nothing.
+    pub(super) fn zero() -> Self {
+        Self { normal: SMatrix::zeros(), gradient: SVector::zeros() }
+    }
+
     /// Both directions of every match, linearized at these cameras; of unknowns that are held fixed, those without a column,
     /// nothing is said.
     pub(super) fn new(cameras: &[Camera], pair: &PairObservations, columns: &Columns<LOCAL>, huber_px: f64) -> Self {
@@ -121,7 +126,7 @@ impl<const LOCAL: usize> FreeSums<LOCAL> {
     }
 
     fn term(&self) -> PairTerm<LOCAL> {
-        let mut term = PairTerm { normal: SMatrix::zeros(), gradient: SVector::zeros() };
+        let mut term = PairTerm::zero();
         let free = &self.free[..self.count];
         for (place, &row) in free.iter().enumerate() {
             for (&column, &sum) in free.iter().zip(&self.normal[place][..=place]) {
@@ -162,15 +167,15 @@ impl Transfer<'_> {
     ) {
         let bearing = self.from.bearing(Vector2::from(source));
         let arrived = *self.to_from_from * bearing;
-        let Some(place) = self.to.project(arrived) else { return };
-        let residual = Vector2::from(target) - place;
-        let weight = huber(residual.norm(), huber_px).1;
-        let jacobian: Option<SMatrix<f64, 2, LOCAL>> = match LOCAL {
-            PINHOLE_LOCAL => Some(self.pinhole_jacobian(bearing, arrived, place)),
-            _ => self.lens_jacobian(bearing, arrived),
+        let placed: Option<(Vector2<f64>, SMatrix<f64, 2, LOCAL>)> = match LOCAL {
+            PINHOLE_LOCAL => {
+                self.to.project(arrived).map(|place| (place, self.pinhole_jacobian(bearing, arrived, place)))
+            }
+            _ => self.by_lenses(bearing, arrived),
         };
-        if let Some(jacobian) = jacobian {
-            sums.add(&jacobian, residual, weight);
+        if let Some((place, jacobian)) = placed {
+            let residual = Vector2::from(target) - place;
+            sums.add(&jacobian, residual, huber(residual.norm(), huber_px).1);
         }
     }
 
@@ -199,14 +204,14 @@ impl Transfer<'_> {
         jacobian
     }
 
-    /// How the residual changes with the rotations and all intrinsics. `None` where a lens does not tell.
+    /// The place, and how the residual changes with the rotations and all intrinsics. `None` where a lens does not tell.
     ///
     /// A pixel of `from` stays where it is: its bearing moves so as to undo what the intrinsics do to the pixel.
-    fn lens_jacobian<const LOCAL: usize>(
+    fn by_lenses<const LOCAL: usize>(
         &self,
         bearing: Vector3<f64>,
         arrived: Vector3<f64>,
-    ) -> Option<SMatrix<f64, 2, LOCAL>> {
+    ) -> Option<(Vector2<f64>, SMatrix<f64, 2, LOCAL>)> {
         let Self { from, to, to_from_from, columns } = self;
         let (leaving, arriving) = (from.projection_derivatives(bearing)?, to.projection_derivatives(arrived)?);
         let projection = arriving.by_bearing;
@@ -218,6 +223,6 @@ impl Transfer<'_> {
         jacobian.fixed_columns_mut::<3>(columns.to_rotation).copy_from(&(projection * cross_matrix(&arrived)));
         jacobian.fixed_columns_mut::<INTRINSICS>(columns.from_intrinsics).copy_from(&by_from_intrinsics);
         jacobian.fixed_columns_mut::<INTRINSICS>(columns.to_intrinsics).copy_from(&-arriving.by_intrinsics);
-        Some(jacobian)
+        Some((arriving.pixel, jacobian))
     }
 }

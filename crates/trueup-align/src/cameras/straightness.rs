@@ -9,7 +9,7 @@
 //! Nobody chooses the lines. Whatever edge goes on smoothly takes part, and what is not straight in the scene loses its
 //! influence by a loss that forgives (Cauchy).
 
-use nalgebra::{DVector, Matrix2, Matrix3, Matrix3x2, RowSVector, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{DVector, Matrix2, Matrix2x3, Matrix3, Matrix3x2, RowSVector, SMatrix, SVector, Vector2, Vector3};
 use trueup_core::camera::{Camera, INTRINSICS, ProjectionDerivatives};
 use trueup_core::lines::EdgeCurve;
 use trueup_core::source::WorkingFrame;
@@ -85,7 +85,13 @@ pub(super) struct CurveTerm {
 pub(super) fn curve_cost(cameras: &[Camera], cluster: &CurveCluster, huber_px: f64) -> f64 {
     let camera = &cameras[cluster.photograph];
     let cost = |curve: &EdgeCurve| {
-        let mean_square = Plane::through(camera, curve).map_or(f64::INFINITY, |plane| plane.mean_square());
+        let plane = || {
+            let rays = rays(camera, curve);
+            let by_bearing: Vec<_> =
+                rays.iter().map(|ray| camera.projection_by_bearing(*ray)).collect::<Option<_>>()?;
+            Plane::through(&rays, |k| &by_bearing[k])
+        };
+        let mean_square = plane().map_or(f64::INFINITY, |plane| plane.mean_square());
         cauchy(mean_square, huber_px).0
     };
     cluster.curves.iter().map(cost).sum()
@@ -106,8 +112,7 @@ impl CurveTerm {
         let camera = &cameras[cluster.photograph];
         let mut term = Self { normal: SMatrix::zeros(), gradient: SVector::zeros() };
         for curve in &cluster.curves {
-            let Some(plane) = Plane::through(camera, curve) else { continue };
-            let Some(jacobian) = plane.jacobian() else { continue };
+            let Some((plane, jacobian)) = linearized(camera, curve) else { continue };
             let weight = cauchy(plane.mean_square(), huber_px).1 / curve.places.len() as f64;
             for (row, distance) in jacobian.iter().zip(plane.distances_px.iter()) {
                 let weighted = row.transpose() * weight;
@@ -119,14 +124,25 @@ impl CurveTerm {
     }
 }
 
+/// The plane of an edge, and how the distances from it change with the intrinsics, a row for each; `None` where a ray has no place.
+fn linearized(camera: &Camera, curve: &EdgeCurve) -> Option<(Plane, Vec<RowSVector<f64, INTRINSICS>>)> {
+    let rays = rays(camera, curve);
+    let derivatives: Vec<ProjectionDerivatives> =
+        rays.iter().map(|ray| camera.projection_derivatives(*ray)).collect::<Option<_>>()?;
+    let plane = Plane::through(&rays, |k| &derivatives[k].by_bearing)?;
+    let jacobian = plane.jacobian(&rays, &derivatives)?;
+    Some((plane, jacobian))
+}
+
+/// The rays along an edge, unit length.
+fn rays(camera: &Camera, curve: &EdgeCurve) -> Vec<Vector3<f64>> {
+    curve.places.iter().map(|place| camera.bearing(Vector2::from(*place)).normalize()).collect()
+}
+
 /// The plane through the camera nearest to the rays along an edge.
 struct Plane {
     /// Unit normal.
     normal: Vector3<f64>,
-    /// The rays, unit length.
-    rays: Vec<Vector3<f64>>,
-    /// How the picture of each ray moves.
-    derivatives: Vec<ProjectionDerivatives>,
     /// How many pixels a ray's picture moves as the ray moves along the normal.
     scales_px: Vec<f64>,
     /// How far each place is from the plane's picture, pixels.
@@ -134,35 +150,36 @@ struct Plane {
 }
 
 impl Plane {
-    fn through(camera: &Camera, curve: &EdgeCurve) -> Option<Self> {
-        let rays: Vec<Vector3<f64>> =
-            curve.places.iter().map(|place| camera.bearing(Vector2::from(*place)).normalize()).collect();
+    /// Through rays whose pictures move with them as `by_bearing` says of each.
+    fn through<'a>(rays: &[Vector3<f64>], by_bearing: impl Fn(usize) -> &'a Matrix2x3<f64>) -> Option<Self> {
         let spread = |weight: &dyn Fn(usize) -> f64| {
             let scatter = |k: usize| rays[k] * rays[k].transpose() * weight(k);
             (0..rays.len()).map(scatter).fold(Matrix3::zeros(), |sum, one| sum + one)
         };
-        let derivatives: Vec<ProjectionDerivatives> =
-            rays.iter().map(|ray| camera.projection_derivatives(*ray)).collect::<Option<_>>()?;
         // Distances in the photograph are those of rays, times a scale that hardly changes along the edge.
         let roughly = flattest(&spread(&|_| 1.0))?;
-        let scales_px: Vec<f64> = derivatives.iter().map(|one| (one.by_bearing * roughly).norm()).collect();
+        let scales_px: Vec<f64> = (0..rays.len()).map(|k| (by_bearing(k) * roughly).norm()).collect();
         let normal = flattest(&spread(&|k| scales_px[k] * scales_px[k]))?;
         let distances_px = DVector::from_fn(rays.len(), |k, _| scales_px[k] * normal.dot(&rays[k]));
-        Some(Self { normal, rays, derivatives, scales_px, distances_px })
+        Some(Self { normal, scales_px, distances_px })
     }
 
     fn mean_square(&self) -> f64 {
-        self.distances_px.norm_squared() / self.rays.len() as f64
+        self.distances_px.norm_squared() / self.distances_px.len() as f64
     }
 
-    /// How the distances change with the intrinsics while the places stay, and the plane turns after them: a row for each.
-    fn jacobian(&self) -> Option<Vec<RowSVector<f64, INTRINSICS>>> {
-        let across = self.normal.cross(&self.rays[self.rays.len() / 2]).normalize();
+    /// How the distances of its rays change with the intrinsics while the places stay, and the plane turns after them: a row for each.
+    fn jacobian(
+        &self,
+        rays: &[Vector3<f64>],
+        derivatives: &[ProjectionDerivatives],
+    ) -> Option<Vec<RowSVector<f64, INTRINSICS>>> {
+        let across = self.normal.cross(&rays[rays.len() / 2]).normalize();
         let tangents = Matrix3x2::from_columns(&[across, self.normal.cross(&across)]);
-        let mut jacobian = Vec::with_capacity(self.rays.len());
+        let mut jacobian = Vec::with_capacity(rays.len());
         let turning = |(ray, scale): (&Vector3<f64>, &f64)| tangents.tr_mul(ray) * *scale;
         let (mut turns, mut coupling) = (Matrix2::zeros(), SMatrix::<f64, 2, INTRINSICS>::zeros());
-        for ((ray, scale), derivatives) in self.rays.iter().zip(&self.scales_px).zip(&self.derivatives) {
+        for ((ray, scale), derivatives) in rays.iter().zip(&self.scales_px).zip(derivatives) {
             let row = (self.normal.transpose() * derivatives.bearing_by_pixel()?) * derivatives.by_intrinsics * -scale;
             let turning = turning((ray, scale));
             turns += turning * turning.transpose();
@@ -170,7 +187,7 @@ impl Plane {
             jacobian.push(row);
         }
         let followed = turns.try_inverse()? * coupling;
-        for (row, one) in jacobian.iter_mut().zip(self.rays.iter().zip(&self.scales_px)) {
+        for (row, one) in jacobian.iter_mut().zip(rays.iter().zip(&self.scales_px)) {
             *row -= turning(one).transpose() * followed;
         }
         Some(jacobian)

@@ -29,7 +29,7 @@ fn seen(camera: &Camera) -> Vec<EdgeCurve> {
 fn a_line_is_straight_through_its_lens_and_bent_without() {
     let line = seen(&camera(-0.1)).remove(7);
     let line = EdgeCurve { places: line.places.iter().map(|place| [place[0], place[1]]).collect() };
-    let rms = |camera: &Camera| Plane::through(camera, &line).expect("a plane").mean_square().sqrt();
+    let rms = |camera: &Camera| linearized(camera, &line).expect("a plane").0.mean_square().sqrt();
     assert!(rms(&camera(-0.1)) < 1e-6);
     // The line is y = 0.4 + 0.3 x here, bent by nearly as much.
     assert!((0.9..1.6).contains(&rms(&camera(0.0))), "{}", rms(&camera(0.0)));
@@ -39,10 +39,9 @@ fn a_line_is_straight_through_its_lens_and_bent_without() {
 fn distances_change_with_the_lens_as_their_derivatives_say() {
     let at = camera(-0.09);
     for curve in seen(&camera(-0.1)) {
-        let plane = Plane::through(&at, &curve).expect("a plane");
-        let jacobian = plane.jacobian().expect("regular");
+        let (plane, jacobian) = linearized(&at, &curve).expect("a plane");
         let step = 1e-4;
-        let [before, after] = [-step, step].map(|step| Plane::through(&camera(-0.09 + step), &curve).expect("a plane"));
+        let [before, after] = [-step, step].map(|step| linearized(&camera(-0.09 + step), &curve).expect("a plane").0);
         // The sense of a normal is anyone's.
         let alike = |one: &Plane| one.distances_px.clone() * one.normal.dot(&plane.normal).signum();
         let numeric = (alike(&after) - alike(&before)) / (2.0 * step);

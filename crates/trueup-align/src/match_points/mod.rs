@@ -100,12 +100,13 @@ pub fn run(
                 let vertices = transfer.carry(&grids[from], &frames[to]);
                 OverlapWarp { from, to, vertices }
             };
-            let warps = [
-                direction(pair.a, pair.b, &points_a, &points_b, b_from_a),
-                direction(pair.b, pair.a, &points_b, &points_a, a_from_b),
-            ];
+            // Side by side, so that no core is left waiting for the last pair.
+            let (there, back) = rayon::join(
+                || direction(pair.a, pair.b, &points_a, &points_b, b_from_a),
+                || direction(pair.b, pair.a, &points_b, &points_a, a_from_b),
+            );
             context.progress().advance(STAGE, 1);
-            Ok(warps)
+            Ok([there, back])
         })
         .collect::<Result<_>>()?;
     context.progress().finish(STAGE);

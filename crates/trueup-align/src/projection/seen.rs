@@ -11,6 +11,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use rayon::prelude::*;
 
 use super::coverage::samples;
 use super::fitted::Fit;
@@ -37,6 +38,8 @@ const EVENING: [f64; 2] = [1.396, PI];
 const ROUNDING: [f64; 2] = [2.094, PI];
 /// Pixels looked at along each side of a photograph.
 const SAMPLES: usize = 17;
+/// Directions whose stretch one task looks at.
+const PER_TASK: usize = 256;
 /// Steps of the search along the family.
 const STEPS: usize = 100;
 
@@ -113,7 +116,7 @@ impl Seen {
     /// more. With a `share` of it only: 1 for views, 0 for turns, which are to be as even as the cylinder.
     fn limits(&self, cylinder: &Flat, share: f64) -> Vec<Stretch> {
         let part = |limit: f64| 1.0 + (limit - 1.0) * share;
-        let limits = self.directions.iter().map(|direction| {
+        let limits = self.directions.par_iter().with_min_len(PER_TASK).map(|direction| {
             let ahead = Vector3::new(0.0, direction.y, direction.x.hypot(direction.z));
             let by_height = stretch(cylinder, &ahead).unwrap_or(Stretch { ratio: 1.0, size: 1.0 });
             Stretch {
@@ -126,7 +129,7 @@ impl Seen {
 
     /// By which factor the limits are exceeded by what is stretched most; infinite where it cannot be drawn.
     fn excess(&self, flat: &Flat, limits: &[Stretch]) -> f64 {
-        let seen = self.directions.iter().zip(limits).map(|(direction, limit)| {
+        let seen = self.directions.par_iter().with_min_len(PER_TASK).zip(limits).map(|(direction, limit)| {
             stretch(flat, direction)
                 .map_or(f64::INFINITY, |stretch| (stretch.ratio / limit.ratio).max(stretch.size / limit.size))
         });

@@ -55,11 +55,27 @@ const NEIGHBOR_ROWS: usize = 16;
 /// Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004.
 pub fn detect(picture: &Raster<f32>, options: &FeatureOptions, context: &StageContext) -> Result<Features> {
     let instructions = InstructionSet::detect();
-    let features = detect_at(SearchSize::Original, picture, options, instructions, context)?;
-    if features.points.len() >= SPARSE_POINTS || !may_double(picture) {
-        return Ok(features);
+    match enough_at_original(picture, options, instructions, context)? {
+        Some(features) => Ok(features),
+        None => detect_at(SearchSize::Doubled, picture, options, instructions, context),
     }
-    detect_at(SearchSize::Doubled, picture, options, instructions, context)
+}
+
+/// The features of a photograph at its own size; `None` where they are so few that it is searched again.
+fn enough_at_original(
+    picture: &Raster<f32>,
+    options: &FeatureOptions,
+    instructions: InstructionSet,
+    context: &StageContext,
+) -> Result<Option<Features>> {
+    let is_enough = |count: usize| count >= SPARSE_POINTS || !may_double(picture);
+    let found = Found::at(SearchSize::Original, picture, options, instructions, context)?;
+    // No more are described than were found: those of a photograph that is searched again anyway need not be.
+    if !is_enough(found.extrema.len()) {
+        return Ok(None);
+    }
+    let features = found.described(instructions, context)?;
+    Ok(is_enough(features.points.len()).then_some(features))
 }
 
 /// Whether the doubled photograph is within the limit.
@@ -75,19 +91,41 @@ fn detect_at(
     instructions: InstructionSet,
     context: &StageContext,
 ) -> Result<Features> {
-    check(size, picture, options)?;
-    if picture.width() == 0 || picture.height() == 0 {
-        return Ok(Features::default());
+    Found::at(size, picture, options, instructions, context)?.described(instructions, context)
+}
+
+/// The strongest extrema of a photograph at one size, and the scale space in which they are.
+struct Found {
+    octaves: Vec<Octave>,
+    extrema: Vec<Extremum>,
+}
+
+impl Found {
+    fn at(
+        size: SearchSize,
+        picture: &Raster<f32>,
+        options: &FeatureOptions,
+        instructions: InstructionSet,
+        context: &StageContext,
+    ) -> Result<Self> {
+        check(size, picture, options)?;
+        if picture.width() == 0 || picture.height() == 0 {
+            return Ok(Self { octaves: Vec::new(), extrema: Vec::new() });
+        }
+        let octaves = scale_space::build(picture, size, instructions, context)?;
+        let mut extrema = Vec::new();
+        for octave in 0..octaves.len() {
+            extrema.extend(extrema::find(&octaves, octave, options, instructions, context)?);
+        }
+        // A stable sort: equal responses stay in the order of octave, row and column.
+        extrema.sort_by(|a, b| b.response.abs().total_cmp(&a.response.abs()));
+        extrema.truncate(options.max_points);
+        Ok(Self { octaves, extrema })
     }
-    let octaves = scale_space::build(picture, size, instructions, context)?;
-    let mut extrema = Vec::new();
-    for octave in 0..octaves.len() {
-        extrema.extend(extrema::find(&octaves, octave, options, instructions, context)?);
+
+    fn described(self, instructions: InstructionSet, context: &StageContext) -> Result<Features> {
+        Ok(gathered(described(&self.octaves, &self.extrema, instructions, context)?))
     }
-    // A stable sort: equal responses stay in the order of octave, row and column.
-    extrema.sort_by(|a, b| b.response.abs().total_cmp(&a.response.abs()));
-    extrema.truncate(options.max_points);
-    Ok(gathered(described(&octaves, &extrema, instructions, context)?))
 }
 
 /// What [`describe`] finds for each extremum, in their order.

@@ -26,6 +26,7 @@ mod stacking;
 
 use std::path::Path;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use trueup_align::vanishing::TriadOutcome;
 use trueup_compose::crop::{Crop, Frame, Rectangle};
@@ -33,6 +34,7 @@ use trueup_compose::exposure::Corrections;
 use trueup_compose::fidelity::{self, Fidelity};
 use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::{self, RenderHelpers, Rendered, Resources};
+use trueup_core::diagnostics::Reported;
 use trueup_core::scratch::ScratchSpace;
 use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::told_lens::ToldLens;
@@ -281,18 +283,33 @@ impl<'a> Stitcher<'a> {
             photographs,
         };
         let key = matched.key_of(members);
-        let corrections = compose::known_light(&light, key, memo, &self.options.compose, context)?;
-        let corrections = context.absorb(corrections);
         let mut project = unfilled(matched, &fixed, members, groups);
         let geometry = geometry.as_ref();
+        // Neither asks for the other, and both leave a core waiting here and there.
+        let start = Instant::now();
+        let (corrections, measured) = rayon::join(
+            || compose::known_light(&light, key, memo, &self.options.compose, context),
+            || {
+                let start = Instant::now();
+                let measured = geometry.map(|geometry| {
+                    let evidence = Evidence::of(&component, geometry);
+                    let measures = measuring::run(&evidence, &arrangement, &project.images);
+                    (evidence, measures)
+                });
+                (measured, start.elapsed())
+            },
+        );
+        let (Reported { value: corrections, findings, seconds }, (measured, measuring)) = (corrections?, measured);
+        let exposing = Duration::from_secs_f64(seconds.values().sum());
+        context.share(start.elapsed(), &[("exposure", exposing), ("measures", measuring)]);
+        findings.into_iter().for_each(|finding| context.report(finding));
         let found =
             GeometryRecord { component: &component, geometry, arrangement: &arrangement, corrections: &corrections };
         fill_geometry(&mut project, &found);
         project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
         project.light = photographs.light();
-        let evidence = geometry.map(|geometry| context.time("measures", || Evidence::of(&component, geometry)));
-        let measure = |evidence| context.time("measures", || measuring::run(evidence, &arrangement, &project.images));
-        project.measures = evidence.as_ref().map(measure);
+        let (evidence, measures) = measured.unzip();
+        project.measures = measures;
         let on_side = geometry.and_then(|geometry| sideways::warning(&geometry.cameras.cameras, members));
         let looked_at = judgement::warnings(&project, &context.findings());
         looked_at.into_iter().chain(on_side).for_each(|warning| context.report(warning));
