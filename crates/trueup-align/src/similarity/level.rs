@@ -1,6 +1,6 @@
 //! One vertical of everything that tells of it, each by how sure it is.
 //!
-//! The cameras expect to be held level, sensors recorded gravity, lines point down. Each gives a direction and a
+//! The cameras expect to be held level, sensors recorded gravity, a far horizon is level, lines point down. Each gives a direction and a
 //! covariance; the vertical is the direction of least summed squares, each in units of its own deviation, so that none is
 //! believed altogether or not at all.
 
@@ -10,6 +10,7 @@ use trueup_core::geometry::orthonormal_complement;
 
 use super::gate::CameraAngle;
 use super::gravity::MeanGravity;
+use crate::far_horizon::FarHorizon;
 use crate::straightening::{Straightened, level_moment, straighten, straighten_with_pitch};
 
 /// Roll that photographers leave, degrees: what is expected before the photographs show their own. Reasoned: hand-held
@@ -22,6 +23,9 @@ const FITTED: f64 = 2.0;
 /// How many of its deviations the cameras' level lies from the vertical when it counts for a quarter (Geman-McClure): nothing
 /// keeps photographers from tilting all photographs alike.
 const HELD_SCALE: f64 = 2.0;
+/// A far horizon farther from the vertical of lines that may guide than so many deviations of both is none: what lines agree on is seen as well, and in
+/// most scenes by more photographs.
+const MAX_HORIZON_DEVIATIONS: f64 = 4.0;
 /// Steps toward the vertical of least squares. Where the cameras' level is far off, it takes several to do without it.
 const STEPS: usize = 20;
 
@@ -35,6 +39,8 @@ pub enum LevelSource {
     Gravity,
     /// The expectation that cameras are held level.
     Cameras,
+    /// The far horizon of sea or plain.
+    Horizon,
 }
 
 /// What one source said of the vertical, and what it came to count for.
@@ -60,32 +66,33 @@ struct Say {
     down: Vector3<f64>,
     /// Of what a vertical is orthogonal to, rad^-2.
     moment: Matrix3<f64>,
-    /// Of the vertical itself, rad^-2 about every axis.
-    information: f64,
+    /// Of the vertical itself, rad^-2.
+    information: Matrix3<f64>,
 }
 
 impl Say {
     /// What the squares of `down` are beyond those of its own vertical.
     fn squares_beyond(&self, down: &Vector3<f64>) -> f64 {
         let squares = |direction: &Vector3<f64>| direction.dot(&(self.moment * direction));
-        (squares(down) - squares(&self.down)).max(0.0) + (down - self.down).norm_squared() * self.information
+        let off = down - self.down;
+        (squares(down) - squares(&self.down)).max(0.0) + off.dot(&(self.information * off))
     }
 
     /// What is left of this say if the vertical is `down`: all of what was seen, less of what was only expected.
     fn heeded(&self, down: &Vector3<f64>) -> Self {
-        let expected = Self { information: 0.0, ..*self };
+        let expected = Self { information: Matrix3::zeros(), ..*self };
         let beyond = expected.squares_beyond(down) / HELD_SCALE.powi(2);
         Self { moment: self.moment * (1.0 + beyond).powi(-2), ..*self }
     }
 
     /// Information about turns of `down` along the columns of `basis`.
     fn information(&self, basis: &Matrix3x2<f64>) -> Matrix2<f64> {
-        basis.tr_mul(&(self.moment * basis)) + Matrix2::identity() * self.information
+        basis.tr_mul(&((self.moment + self.information) * basis))
     }
 
     /// Half the gradient of the squares at `down` along the columns of `basis`.
     fn gradient(&self, down: &Vector3<f64>, basis: &Matrix3x2<f64>) -> Vector2<f64> {
-        basis.tr_mul(&(self.moment * down - self.down * self.information))
+        basis.tr_mul(&(self.moment * down + self.information * (down - self.down)))
     }
 
     /// Standard deviation in radians about the axis it tells least of.
@@ -101,7 +108,7 @@ pub(super) struct CameraLevel<'a> {
     pub rotations: &'a [Matrix3<f64>],
     /// By [`straighten`], as published.
     pub straightened: Straightened,
-    /// Down in the common frame, by the cameras and by recorded gravity.
+    /// Down in the common frame, by the cameras, by recorded gravity and by the far horizon.
     pub down: Vector3<f64>,
     /// Whether recorded gravity takes part.
     pub has_gravity: bool,
@@ -117,20 +124,39 @@ impl<'a> CameraLevel<'a> {
             photographs: rotations.len(),
             down: level,
             moment: level_moment(rotations, pitch_prior) / roll_variance(rotations, &level),
-            information: 0.0,
+            information: Matrix3::zeros(),
         };
         let gravity = gravity.map(|gravity| Say {
             source: LevelSource::Gravity,
             photographs: gravity.photographs,
             down: gravity.down,
             moment: Matrix3::zeros(),
-            information: gravity.deviation.powi(-2),
+            information: Matrix3::identity() * gravity.deviation.powi(-2),
         });
         let says: Vec<Say> = [Some(cameras), gravity].into_iter().flatten().collect();
         let has_gravity = gravity.is_some();
         let start = gravity.map_or(level, |gravity| gravity.down);
         let down = if has_gravity { combined(&says, &start) } else { level };
         Self { rotations, straightened: straighten(rotations), down, has_gravity, says }
+    }
+
+    /// The same with a far horizon that was found.
+    pub(super) fn with_horizon(self, horizon: &FarHorizon) -> Self {
+        let mut says = self.says;
+        says.push(Say {
+            source: LevelSource::Horizon,
+            photographs: horizon.photographs,
+            down: horizon.down,
+            moment: Matrix3::zeros(),
+            information: horizon.information,
+        });
+        let down = combined(&says, &horizon.down);
+        Self { down, says, ..self }
+    }
+
+    /// How many deviations of what is known without lines a vertical lies from its own.
+    pub(super) fn deviations_to(&self, down: &Vector3<f64>) -> f64 {
+        self.says.iter().map(|say| say.squares_beyond(down)).sum::<f64>().sqrt()
     }
 
     /// Standard deviation in radians of `down`, about the axis that is known worst.
@@ -148,7 +174,9 @@ impl<'a> CameraLevel<'a> {
             (false, true) => self.straightened.down,
             (false, false) => return None,
         };
-        let squares: f64 = self.says.iter().map(|say| say.squares_beyond(down)).sum();
+        // The horizon is compared with lines where both are weighed.
+        let held = self.says.iter().filter(|say| say.source != LevelSource::Horizon);
+        let squares: f64 = held.map(|say| say.squares_beyond(down)).sum();
         let squared_rolls = self.rotations.iter().map(|rotation| (rotation * down).x.asin().powi(2));
         let rolls = (squared_rolls.sum::<f64>() / self.rotations.len() as f64).sqrt();
         let pitch_is_untold = !self.has_gravity && self.rotations.len() == 2;
@@ -165,21 +193,26 @@ impl<'a> CameraLevel<'a> {
     }
 
     /// The vertical with what lines say of it, which deviates by `deviation` radians in `photographs` photographs, weighed in; and
-    /// what told of it.
+    /// what told of it. A far horizon that contradicts the lines does not count.
     pub(super) fn with_lines(
         &self,
         lines: &Vector3<f64>,
         deviation: f64,
         photographs: usize,
     ) -> (Vector3<f64>, Vec<LevelEvidence>) {
-        let mut says = vec![Say {
+        let contradicts = |say: &Say| {
+            let off = lines.angle(&say.down);
+            say.source == LevelSource::Horizon && off > MAX_HORIZON_DEVIATIONS * deviation.hypot(say.deviation())
+        };
+        let lines_say = Say {
             source: LevelSource::Lines,
             photographs,
             down: *lines,
             moment: Matrix3::zeros(),
-            information: deviation.powi(-2),
-        }];
-        says.extend_from_slice(&self.says);
+            information: Matrix3::identity() * deviation.powi(-2),
+        };
+        let others = self.says.iter().copied().filter(|say| !contradicts(say));
+        let says: Vec<Say> = std::iter::once(lines_say).chain(others).collect();
         let down = combined(&says, lines);
         let evidence = evidence(&says, &down);
         (down, evidence)

@@ -59,6 +59,7 @@ use level::CameraLevel;
 use upright::{Upright, rolls};
 use vpg::Guided;
 
+use crate::far_horizon;
 use crate::straightening;
 
 pub use flat::of_flat_scene;
@@ -69,6 +70,8 @@ pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
 pub use printed::PrintedEquations;
 pub use prior::{Guidance, SimilarityPrior, VerticalSpread};
 
+/// Farthest that a far horizon may lie from what cameras and gravity tell, in their deviations.
+const FARTHEST_HORIZON: f64 = 4.0;
 /// What a user can do when lines do not guide the panorama.
 const REFUSED_HINT: &str =
     "The panorama is levelled by how its cameras were held; photographs that show upright edges level it better";
@@ -92,6 +95,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
     let gravity = options.gravity.then(|| MeanGravity::of(&rotations, input.gravity)).flatten();
     let level = CameraLevel::new(&rotations, options.pitch_prior, gravity);
+    let level = with_far_horizon(level, input, options);
     let straightened = level.straightened.down;
     let unguided = |told: Vec<LevelEvidence>| {
         Guidance::none(input.cameras.len(), gate::allowed_divergence(input.cameras.len(), options), told)
@@ -133,6 +137,23 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
         roll: rolls(&upright.down, &upright.rotations),
         camera_from_world: upright.rotations.iter().map(rows_of).collect(),
     })
+}
+
+/// What is known of the vertical without lines, with the far horizon if the method asks for the vertical and the photographs show one beyond doubt.
+fn with_far_horizon<'a>(
+    level: CameraLevel<'a>,
+    input: &PriorInput<'_>,
+    options: &SimilarityOptions,
+) -> CameraLevel<'a> {
+    let asks = matches!(input.method, PriorMethod::VanishingPoints | PriorMethod::Straightening);
+    if !options.far_horizon || !asks {
+        return level;
+    }
+    let is_plausible = |down: &Vector3<f64>| level.deviations_to(down) <= FARTHEST_HORIZON;
+    match far_horizon::find(input.shown, input.cameras, &level.down, is_plausible) {
+        Some(horizon) => level.with_horizon(&horizon),
+        None => level,
+    }
 }
 
 /// Straightened cameras.
