@@ -9,6 +9,8 @@ use super::edges::SkyEdge;
 
 /// Curves that circles are laid through, the longest.
 const MOST_CURVES: usize = 40;
+/// Fewest degrees of azimuth that edges take of a circle that is fitted: half of what a horizon must have.
+const FEWEST_STEPS: usize = 20;
 /// Circles that are looked at closely.
 const MOST_CIRCLES: usize = 6;
 /// Verticals nearer than this are one, radians (half a degree).
@@ -68,7 +70,10 @@ pub(super) fn through(
                     steps.iter().for_each(|&step| covered[step] = true);
                 }
             }
-            tried.push((covered.iter().filter(|&&step| step).count(), down));
+            let covered = covered.iter().filter(|&&step| step).count();
+            if covered >= FEWEST_STEPS {
+                tried.push((covered, down));
+            }
         }
     }
     tried.sort_by(|one, other| other.0.cmp(&one.0));
@@ -267,4 +272,65 @@ fn cells(edges: &[SkyEdge], down: &Vector3<f64>, dip: f64) -> Vec<(Vector3<f64>,
         |cell: usize| 2 * covered[cell * steps..(cell + 1) * steps].iter().filter(|&&step| step).count() >= steps;
     let cells = sums.into_iter().enumerate().filter(|(cell, sum)| sum.2 > 0.0 && half_covered(*cell));
     cells.map(|(_, (direction, off, length))| (direction.normalize(), off / length)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Edges of a degree each, `dip` below level, over azimuths `from` to `to` in degrees about y.
+    fn horizon(dip: f64, from: usize, to: usize) -> Vec<SkyEdge> {
+        let direction = |degree: usize| {
+            let azimuth = (degree as f64).to_radians();
+            Vector3::new(azimuth.sin() * dip.cos(), dip.sin(), azimuth.cos() * dip.cos())
+        };
+        let edge = |degree: usize| SkyEdge {
+            photograph: degree / 40,
+            curve: 0,
+            ends: [direction(degree), direction(degree + 1)],
+            jump: 50.0,
+            sky: Vector3::repeat(200.0),
+        };
+        (from..to).map(edge).collect()
+    }
+
+    /// All round the dip is told from the vertical. Of 36 cells each axis sees the squares of 36 cosines, 18; none is off, so that their variance is what four
+    /// expected ones leave of 33 + 4; four neighbors err alike.
+    #[test]
+    fn all_round_the_dip_is_known_apart_from_the_vertical() {
+        let edges = horizon(0.004, 0, 360);
+        let circle = HorizonCircle::fitted(&edges, Vector3::y()).expect("a circle");
+        assert!(circle.down.angle(&Vector3::y()) < 1e-6, "{}", circle.down);
+        assert!((circle.dip - 0.004).abs() < 1e-4, "{}", circle.dip);
+        let of_cells = 4.0 * CELL_DEVIATION.powi(2) * 4.0 / 37.0 / 18.0;
+        let expected = (of_cells + COMMON_DEVIATION.powi(2)).sqrt();
+        assert!((circle.deviation() - expected).abs() < 0.02 * expected, "{} and {expected}", circle.deviation());
+    }
+
+    /// Over 60 degrees a dip looks like a pitch: the vertical is off by what the dip is beyond the expected one, which its deviation knows.
+    #[test]
+    fn over_a_narrow_view_a_dip_is_a_pitch() {
+        let edges = horizon(0.004, 0, 60);
+        let circle = HorizonCircle::fitted(&edges, Vector3::y()).expect("a circle");
+        let off = circle.down.angle(&Vector3::y());
+        assert!(off > 0.001 && off < 2.0 * circle.deviation(), "{off}");
+        assert!(circle.deviation() > DIP_DEVIATION);
+    }
+
+    #[test]
+    fn circles_are_ordered_by_the_azimuth_that_edges_take() {
+        let tilt = trueup_core::geometry::rotation_about_x(0.1);
+        let mut edges = horizon(0.0, 0, 100);
+        edges.extend(horizon(0.0, 200, 250).into_iter().map(|edge| SkyEdge {
+            photograph: edge.photograph + 10,
+            ends: edge.ends.map(|end| tilt * end),
+            ..edge
+        }));
+        let circles = through(&edges, &Vector3::y(), |_| true);
+        assert!(circles[0].down.angle(&Vector3::y()) < 0.002, "{}", circles[0].down);
+        assert!(circles.iter().any(|circle| circle.down.angle(&(tilt * Vector3::y())) < 0.002));
+        // What cannot be down is not tried.
+        assert!(through(&edges, &Vector3::y(), |_| false).is_empty());
+        assert!(through(&[], &Vector3::y(), |_| true).is_empty());
+    }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::view::{Color, Sides, View, brightness};
+use super::view::{Color, Sides, View};
 
 /// Least difference of the colors on both sides, gray levels.
 const MIN_JUMP: f64 = 8.0;
@@ -75,6 +75,5 @@ pub(super) fn under_sky(photograph: usize, view: &View<'_>, down: &Vector3<f64>)
 /// Whether what is above an edge looks like sky over ground or water: brighter, and even.
 fn is_under_sky(sides: &Sides) -> bool {
     let jump = sides.jump();
-    let is_brighter = brightness(&sides.above[0]) > brightness(&sides.below[0]);
-    jump >= MIN_JUMP && is_brighter && sides.step_above() <= MAX_STEP_SHARE * jump
+    jump >= MIN_JUMP && sides.is_brighter_above() && sides.step_above() <= MAX_STEP_SHARE * jump
 }

@@ -13,6 +13,9 @@ mod edges;
 mod evidence;
 mod view;
 
+#[cfg(test)]
+mod tests;
+
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::camera::Camera;
 use trueup_core::lines::EdgeCurve;

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::camera::Camera;
 use trueup_core::lines::EdgeCurve;
-use trueup_core::raster::Raster;
+use trueup_core::raster::{Raster, luma_256ths};
 
 use super::ShownPhotograph;
 
@@ -95,17 +95,19 @@ impl<'a> View<'a> {
         // The casts saturate, and the last pixel reaches a fraction beyond.
         let (x, y) = ((pixel.x as usize).min(width.checked_sub(1)?), (pixel.y as usize).min(height.checked_sub(1)?));
         let samples = self.thumbnail.pixel(x, y);
-        let channel = |index: usize| f64::from(samples[index.min(samples.len() - 1)]);
-        Some(Color::new(channel(0), channel(1), channel(2)))
+        let channel = |index: usize| samples.get(index).or(samples.first()).copied().map(f64::from);
+        Some(Color::new(channel(0)?, channel(1)?, channel(2)?))
     }
 }
 
-/// Brightness of a color, 0 to 255.
-pub(super) fn brightness(color: &Color) -> f64 {
-    0.3 * color.x + 0.6 * color.y + 0.1 * color.z
-}
-
 impl Sides {
+    /// Whether it is brighter above the edge than below.
+    pub(super) fn is_brighter_above(&self) -> bool {
+        // The colors are those of pixels: whole numbers of eight bits.
+        let [above, below] = [self.above[0], self.below[0]].map(|color| luma_256ths(color.map(|one| one as u8).into()));
+        above > below
+    }
+
     /// How far the colors next to the edge differ.
     pub(super) fn jump(&self) -> f64 {
         difference(&self.above[0], &self.below[0])

@@ -334,6 +334,45 @@ mod tests {
         assert!(shares[0] < 1e-3 && shares[1] > 0.999, "{shares:?}");
     }
 
+    fn far_horizon(down: Vector3<f64>, deviation: f64) -> FarHorizon {
+        let about = Matrix3::identity() - down * down.transpose();
+        FarHorizon { down, information: about * deviation.powi(-2), photographs: 3 }
+    }
+
+    /// Cameras that all look up by 0.1 expect a level that is off by that, the horizon knows: it is surer by far.
+    #[test]
+    fn a_far_horizon_outweighs_how_cameras_are_held() {
+        let rotations: Vec<Matrix3<f64>> =
+            [-0.2, 0.2].map(|yaw| rotation_about_x(-0.1) * rotation_about_y(yaw)).to_vec();
+        let level = CameraLevel::new(&rotations, PITCH_PRIOR, None);
+        assert!(level.down.angle(&Vector3::y()) > 0.04, "{}", level.down);
+        let level = level.with_horizon(&far_horizon(Vector3::y(), 0.003));
+        assert!(level.down.angle(&Vector3::y()) < 0.001, "{}", level.down);
+        let evidence = level.evidence();
+        let [cameras, horizon] = evidence[..] else { panic!("two sources") };
+        assert_eq!((horizon.source, horizon.photographs), (LevelSource::Horizon, 3));
+        assert!(horizon.share > 0.95 && cameras.share < 0.05, "{evidence:?}");
+        assert!((horizon.deviation - 0.003).abs() < 1e-9);
+    }
+
+    /// Lines sure to 0.002 and a horizon sure to 0.004, 0.01 apart, are 2.2 deviations of both: the mean lies at a fifth, but for what the cameras tell. 0.05 apart are 11, and
+    /// the horizon is none.
+    #[test]
+    fn a_far_horizon_that_contradicts_the_lines_does_not_count() {
+        let rotations = all_round(0.0);
+        let with = |angle: f64| {
+            let down = rotation_about_x(angle) * Vector3::y();
+            let level = CameraLevel::new(&rotations, 0.0, None).with_horizon(&far_horizon(down, 0.004));
+            level.with_lines(&Vector3::y(), 0.002, 4)
+        };
+        let (down, evidence) = with(0.01);
+        assert!((down.angle(&Vector3::y()) - 0.002).abs() < 1e-4, "{}", down.angle(&Vector3::y()));
+        assert_eq!(evidence.len(), 3);
+        let (down, evidence) = with(0.05);
+        assert!(down.angle(&Vector3::y()) < 1e-9, "{}", down.angle(&Vector3::y()));
+        assert!(evidence.iter().all(|one| one.source != LevelSource::Horizon));
+    }
+
     #[test]
     fn a_single_photograph_has_a_level() {
         let rotations = [Matrix3::identity()];

@@ -74,7 +74,7 @@ pub use prior::{Guidance, SimilarityPrior, VerticalSpread};
 const FARTHEST_HORIZON: f64 = 4.0;
 /// What a user can do when lines do not guide the panorama.
 const REFUSED_HINT: &str =
-    "The panorama is levelled by how its cameras were held; photographs that show upright edges level it better";
+    "What else tells which way is down levels the panorama; photographs that show upright edges level it better";
 
 /// Finds the similarity prior of a connected set of photographs.
 ///
