@@ -13,6 +13,8 @@ const MOST_CURVES: usize = 40;
 const FEWEST_STEPS: usize = 20;
 /// Circles that are looked at closely.
 const MOST_CIRCLES: usize = 6;
+/// Farthest that a circle's vertical may lie from the expected one, radians (25 degrees).
+const MAX_TILT: f64 = 0.44;
 /// Verticals nearer than this are one, radians (half a degree).
 const SAME: f64 = 0.0087;
 /// Farthest that an edge may lie from a circle that is tried, radians (0.4 degrees): the horizon dips by as much from a cliff of 150 m.
@@ -52,18 +54,17 @@ pub(super) struct HorizonCircle {
 }
 
 /// The circles that most of the edges lie on, those with most azimuth first.
-pub(super) fn through(
-    edges: &[SkyEdge],
-    expected: &Vector3<f64>,
-    is_plausible: impl Fn(&Vector3<f64>) -> bool,
-) -> Vec<HorizonCircle> {
+pub(super) fn through(edges: &[SkyEdge], expected: &Vector3<f64>) -> Vec<HorizonCircle> {
     let curves = longest_curves(edges);
     // Among verticals so near to one another it hardly matters about which of them azimuth is counted.
     let steps: Vec<Vec<usize>> = edges.iter().map(|edge| steps_of(edge, expected)).collect();
     let mut tried: Vec<(usize, Vector3<f64>)> = Vec::new();
     for (k, one) in curves.iter().enumerate() {
         for other in &curves[..=k] {
-            let Some(down) = plane_through(&[one, other], expected).filter(|down| is_plausible(down)) else { continue };
+            let Some(down) = plane_through(&[one, other], expected).filter(|down| down.angle(expected) <= MAX_TILT)
+            else {
+                continue;
+            };
             let mut covered = [false; STEPS];
             for (edge, steps) in edges.iter().zip(&steps) {
                 if is_near(edge, &down, 0.0, NEAR_TRIED) {
@@ -85,7 +86,7 @@ pub(super) fn through(
         if circles.iter().any(|circle| circle.down.angle(&down) < SAME) {
             continue;
         }
-        let fitted = HorizonCircle::fitted(edges, down).filter(|circle| is_plausible(&circle.down));
+        let fitted = HorizonCircle::fitted(edges, down);
         circles.extend(fitted.filter(|new| circles.iter().all(|circle| circle.down.angle(&new.down) >= SAME)));
     }
     circles
@@ -326,11 +327,9 @@ mod tests {
             ends: edge.ends.map(|end| tilt * end),
             ..edge
         }));
-        let circles = through(&edges, &Vector3::y(), |_| true);
+        let circles = through(&edges, &Vector3::y());
         assert!(circles[0].down.angle(&Vector3::y()) < 0.002, "{}", circles[0].down);
         assert!(circles.iter().any(|circle| circle.down.angle(&(tilt * Vector3::y())) < 0.002));
-        // What cannot be down is not tried.
-        assert!(through(&edges, &Vector3::y(), |_| false).is_empty());
-        assert!(through(&[], &Vector3::y(), |_| true).is_empty());
+        assert!(through(&[], &Vector3::y()).is_empty());
     }
 }

@@ -6,8 +6,9 @@ use super::view::{Color, View};
 
 /// Least azimuth over which an edge must lie on the horizon, degrees. Reasoned: roofs and walls seldom take as much of what is seen.
 const MIN_FOUND: usize = 40;
-/// Least azimuth between the outermost of these edges, degrees: over less the eye's height over the sea is taken for a pitch.
-const MIN_EXTENT: usize = 60;
+/// Least azimuth between the outermost of these edges, degrees. Reasoned: a straight edge of the scene takes as much only if it is 1.5 times as long as it is far;
+/// and over less the eye's height over the sea is taken for a pitch.
+const MIN_EXTENT: usize = 75;
 /// Least share of what photographs show of the circle on which an edge must lie; foreground may hide the rest.
 const MIN_FOUND_SHARE: f64 = 0.2;
 /// Fewest photographs that must show it: in one, a line that a lens bends and a tilted straight one are alike.

@@ -61,13 +61,16 @@ pub fn find(
     let views: Vec<View> = photographs.iter().zip(cameras).map(|(shown, camera)| View::new(shown, camera)).collect();
     let edges: Vec<SkyEdge> =
         views.iter().enumerate().flat_map(|(index, view)| edges::under_sky(index, view, expected)).collect();
-    let circles = circle::through(&edges, expected, is_plausible);
-    circles.iter().find_map(|circle| {
-        let evidence = HorizonEvidence::along(circle, &edges, &views);
-        evidence.is_beyond_doubt().then(|| FarHorizon {
-            down: circle.down,
-            information: circle.information(),
-            photographs: evidence.photographs,
-        })
-    })
+    for circle in circle::through(&edges, expected) {
+        let evidence = HorizonEvidence::along(&circle, &edges, &views);
+        if evidence.is_beyond_doubt() {
+            // What has less of the edges than a circle that cannot be level is no better one, but part of it.
+            return is_plausible(&circle.down).then(|| FarHorizon {
+                down: circle.down,
+                information: circle.information(),
+                photographs: evidence.photographs,
+            });
+        }
+    }
+    None
 }
