@@ -71,7 +71,7 @@ pub use printed::PrintedEquations;
 pub use prior::{Guidance, SimilarityPrior, VerticalSpread};
 
 /// Farthest that a far horizon may lie from what cameras and gravity tell, in their deviations.
-const FARTHEST_HORIZON: f64 = 4.5;
+const FARTHEST_HORIZON: f64 = 5.0;
 /// The same in degrees: of two photographs cameras know next to nothing. Measured: of cut scenes with a horizon the cameras' level was off by 10 at most, roofs of two
 /// photographs were taken for one that is 22 off.
 const FARTHEST_HORIZON_DEG: f64 = 15.0;
