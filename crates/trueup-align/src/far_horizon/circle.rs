@@ -8,7 +8,7 @@ use trueup_core::geometry::{orthonormal_complement, wrap_angle};
 use super::edges::SkyEdge;
 
 /// Curves that circles are laid through, the longest.
-const MOST_CURVES: usize = 40;
+const MOST_CURVES: usize = 30;
 /// Fewest degrees of azimuth that edges take of a circle that is fitted: half of what a horizon must have.
 const FEWEST_STEPS: usize = 20;
 /// Circles that are looked at closely.
@@ -77,7 +77,7 @@ pub(super) fn through(edges: &[SkyEdge], expected: &Vector3<f64>) -> Vec<Horizon
             }
         }
     }
-    tried.sort_by(|one, other| other.0.cmp(&one.0));
+    tried.sort_by_key(|one| std::cmp::Reverse(one.0));
     let mut circles: Vec<HorizonCircle> = Vec::new();
     for (_, down) in tried {
         if circles.len() == MOST_CIRCLES {

@@ -43,18 +43,25 @@ impl SkyEdge {
 pub(super) fn under_sky(photograph: usize, view: &View<'_>, down: &Vector3<f64>) -> Vec<SkyEdge> {
     let mut edges = Vec::new();
     for (curve, edge) in view.curves.iter().enumerate() {
+        let [Some(&first), Some(&last)] = [edge.places.first(), edge.places.last()] else { continue };
+        if !is_level([view.direction(first), view.direction(last)], down) {
+            continue;
+        }
         let directions: Vec<Vector3<f64>> = edge.places.iter().map(|&place| view.direction(place)).collect();
-        let is_level = |ends: &[Vector3<f64>]| {
-            let along = ends[1] - ends[0];
-            along.dot(down).abs() <= MAX_SLOPE * along.norm() && ends[0].dot(down).abs() <= MAX_HEIGHT
-        };
         // The sides of the last place looked at: most are looked at once, though they end two parts.
         let mut last: Option<(usize, Option<Sides>)> = None;
         for (place, ends) in directions.windows(2).enumerate() {
-            if !is_level(ends) {
+            if !is_level([ends[0], ends[1]], down) {
                 continue;
             }
-            let look = |at: usize| view.sides(&directions[at], down).filter(is_under_sky);
+            let look = |at: usize| {
+                let sides = if view.is_brighter_above(&directions[at], down) {
+                    view.sides(&directions[at], down)
+                } else {
+                    None
+                };
+                sides.filter(is_even_above)
+            };
             let one = last.filter(|(at, _)| *at == place).map_or_else(|| look(place), |(_, sides)| sides);
             let other = look(place + 1);
             last = Some((place + 1, other));
@@ -72,8 +79,14 @@ pub(super) fn under_sky(photograph: usize, view: &View<'_>, down: &Vector3<f64>)
     edges
 }
 
-/// Whether what is above an edge looks like sky over ground or water: brighter, and even.
-fn is_under_sky(sides: &Sides) -> bool {
+/// Whether a part of an edge may be level, and near the horizon, if `down` is about down.
+fn is_level(ends: [Vector3<f64>; 2], down: &Vector3<f64>) -> bool {
+    let along = ends[1] - ends[0];
+    along.dot(down).abs() <= MAX_SLOPE * along.norm() && ends[0].dot(down).abs() <= MAX_HEIGHT
+}
+
+/// Whether what is above an edge is even, as sky is, beside the difference across the edge.
+fn is_even_above(sides: &Sides) -> bool {
     let jump = sides.jump();
-    jump >= MIN_JUMP && sides.is_brighter_above() && sides.step_above() <= MAX_STEP_SHARE * jump
+    jump >= MIN_JUMP && sides.step_above() <= MAX_STEP_SHARE * jump
 }

@@ -60,6 +60,17 @@ impl<'a> View<'a> {
         (self.world_from_camera * self.camera.bearing(Vector2::new(x, y))).normalize()
     }
 
+    /// Whether what lies next to `direction` is brighter above than below, so that a look at more of it is worth its time.
+    pub(super) fn is_brighter_above(&self, direction: &Vector3<f64>, down: &Vector3<f64>) -> bool {
+        let Some(downward) = (down - direction * down.dot(direction)).try_normalize(f64::EPSILON) else { return false };
+        let (sine, cosine) = self.nearest.sin_cos();
+        let beside = [-sine, sine].map(|aside| self.color(&(direction * cosine + downward * aside)));
+        let [Some(above), Some(below)] = beside else { return false };
+        // The colors are those of pixels: whole numbers of eight bits.
+        let [above, below] = [above, below].map(|color| luma_256ths(color.map(|one| one as u8).into()));
+        above > below
+    }
+
     /// The colors on both sides of `direction`, toward `-down` and `down`; `None` where the photograph does not show them all.
     pub(super) fn sides(&self, direction: &Vector3<f64>, down: &Vector3<f64>) -> Option<Sides> {
         let downward = (down - direction * down.dot(direction)).try_normalize(f64::EPSILON)?;
@@ -87,10 +98,13 @@ impl<'a> View<'a> {
     }
 
     fn color(&self, direction: &Vector3<f64>) -> Option<Color> {
-        if !self.camera.shows(*direction, self.size) {
+        let working = self.camera.project(self.world_from_camera.tr_mul(direction))?;
+        let is_inside = (0..2).all(|axis| (0.0..=self.size[axis]).contains(&working[axis]));
+        // Only a lens may carry back into the picture what lies far beside it.
+        if !is_inside || !(self.camera.lens.is_pinhole() || self.camera.shows(*direction, self.size)) {
             return None;
         }
-        let pixel = self.camera.project(self.camera.rotation() * direction)? * self.thumbnail_from_working;
+        let pixel = working * self.thumbnail_from_working;
         let (width, height) = (self.thumbnail.width(), self.thumbnail.height());
         // The casts saturate, and the last pixel reaches a fraction beyond.
         let (x, y) = ((pixel.x as usize).min(width.checked_sub(1)?), (pixel.y as usize).min(height.checked_sub(1)?));
@@ -101,13 +115,6 @@ impl<'a> View<'a> {
 }
 
 impl Sides {
-    /// Whether it is brighter above the edge than below.
-    pub(super) fn is_brighter_above(&self) -> bool {
-        // The colors are those of pixels: whole numbers of eight bits.
-        let [above, below] = [self.above[0], self.below[0]].map(|color| luma_256ths(color.map(|one| one as u8).into()));
-        above > below
-    }
-
     /// How far the colors next to the edge differ.
     pub(super) fn jump(&self) -> f64 {
         difference(&self.above[0], &self.below[0])
