@@ -91,6 +91,7 @@ fn prior(bencher: divan::Bencher<'_, '_>, count: usize) {
         lines: &lines,
         frames: &frames,
         gravity: &[],
+        shown: &[],
         edges: &edges,
         overlaps: &[],
         cell_px: 40.0,

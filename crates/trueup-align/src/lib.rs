@@ -3,6 +3,7 @@
 
 pub mod cameras;
 mod evidence;
+pub mod far_horizon;
 pub mod full_turn;
 mod horizon;
 pub mod match_points;

@@ -104,7 +104,7 @@ pub(crate) fn noise(seed: u64, width: usize, height: usize) -> Vec<u8> {
 }
 
 /// A number in 0..1 that looks random: the output function of SplitMix64.
-fn scramble(seed: u64) -> f64 {
+pub(crate) fn scramble(seed: u64) -> f64 {
     let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -12,6 +12,7 @@ mod determinism;
 mod documented;
 mod evaluate;
 mod failures;
+mod far_horizon;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 mod faults;
 mod flat_scene;

@@ -90,6 +90,7 @@ mod tests {
             lines: &lines,
             frames: &frames,
             gravity: &[],
+            shown: &[],
             edges,
             overlaps: &[],
             cell_px: 40.0,

@@ -65,6 +65,7 @@ impl Graph {
             lines: &self.lines,
             frames: &self.frames,
             gravity: &[],
+            shown: &[],
             edges: &self.edges,
             overlaps: &self.overlaps,
             cell_px: CELL_PX,

@@ -8,10 +8,11 @@ use trueup_core::source::{RecordedGravity, WorkingFrame};
 use trueup_core::{Error, Result};
 
 use super::options::{PriorMethod, SimilarityOptions};
+use crate::far_horizon::ShownPhotograph;
 use crate::match_points::OverlapWarp;
 use crate::vanishing::{TriadOutcome, VanishingOptions};
 
-/// What the prior is made from. Photographs are counted 0..N; all lists but `gravity`, `edges` and `overlaps` have N entries.
+/// What the prior is made from. Photographs are counted 0..N; all lists but `gravity`, `shown`, `edges` and `overlaps` have N entries.
 #[derive(Debug, Clone, Copy)]
 pub struct PriorInput<'a> {
     /// Which prior is wanted.
@@ -26,6 +27,8 @@ pub struct PriorInput<'a> {
     pub frames: &'a [WorkingFrame],
     /// Which way each photograph's camera recorded as down, if it did. May be empty: then none did.
     pub gravity: &'a [Option<RecordedGravity>],
+    /// What the far horizon is sought in. May be empty: then it does not tell.
+    pub shown: &'a [ShownPhotograph<'a>],
     /// The joined pairs.
     pub edges: &'a [PairMatches],
     /// Grid vertices carried across the pairs, both directions. May be empty: then overlaps correct nothing.
@@ -56,9 +59,12 @@ impl PriorInput<'_> {
             return unsolvable("there are no photographs".to_owned());
         }
         let gravity = if input.gravity.is_empty() { count } else { input.gravity.len() };
-        let lengths = [input.triads.len(), input.lines.len(), input.frames.len(), gravity];
+        let shown = if input.shown.is_empty() { count } else { input.shown.len() };
+        let lengths = [input.triads.len(), input.lines.len(), input.frames.len(), gravity, shown];
         if lengths.iter().any(|&length| length != count) {
-            return unsolvable(format!("cameras, triads, segments, frames and gravity differ in number from {count}"));
+            return unsolvable(format!(
+                "cameras, triads, segments, frames, gravity and edges differ in number from {count}"
+            ));
         }
         if let Some(edge) = input.edges.iter().find(|edge| edge.a >= count || edge.b >= count || edge.a == edge.b) {
             return unsolvable(format!("there is no pair {} - {} among {count} photographs", edge.a, edge.b));

@@ -1,6 +1,6 @@
 //! One vertical of everything that tells of it, each by how sure it is.
 //!
-//! The cameras expect to be held level, sensors recorded gravity, lines point down. Each gives a direction and a
+//! The cameras expect to be held level, sensors recorded gravity, a far horizon is level, lines point down. Each gives a direction and a
 //! covariance; the vertical is the direction of least summed squares, each in units of its own deviation, so that none is
 //! believed altogether or not at all.
 
@@ -10,6 +10,7 @@ use trueup_core::geometry::orthonormal_complement;
 
 use super::gate::CameraAngle;
 use super::gravity::MeanGravity;
+use crate::far_horizon::FarHorizon;
 use crate::straightening::{Straightened, level_moment, straighten, straighten_with_pitch};
 
 /// Roll that photographers leave, degrees: what is expected before the photographs show their own. Reasoned: hand-held
@@ -22,6 +23,9 @@ const FITTED: f64 = 2.0;
 /// How many of its deviations the cameras' level lies from the vertical when it counts for a quarter (Geman-McClure): nothing
 /// keeps photographers from tilting all photographs alike.
 const HELD_SCALE: f64 = 2.0;
+/// A far horizon farther from the vertical of lines that may guide than so many deviations of both is none: what lines agree on is seen as well, and in
+/// most scenes by more photographs.
+const MAX_HORIZON_DEVIATIONS: f64 = 4.0;
 /// Steps toward the vertical of least squares. Where the cameras' level is far off, it takes several to do without it.
 const STEPS: usize = 20;
 
@@ -35,6 +39,8 @@ pub enum LevelSource {
     Gravity,
     /// The expectation that cameras are held level.
     Cameras,
+    /// The far horizon of sea or plain.
+    Horizon,
 }
 
 /// What one source said of the vertical, and what it came to count for.
@@ -60,20 +66,26 @@ struct Say {
     down: Vector3<f64>,
     /// Of what a vertical is orthogonal to, rad^-2.
     moment: Matrix3<f64>,
-    /// Of the vertical itself, rad^-2 about every axis.
-    information: f64,
+    /// Of the vertical itself, rad^-2.
+    information: Matrix3<f64>,
 }
 
 impl Say {
     /// What the squares of `down` are beyond those of its own vertical.
     fn squares_beyond(&self, down: &Vector3<f64>) -> f64 {
         let squares = |direction: &Vector3<f64>| direction.dot(&(self.moment * direction));
-        (squares(down) - squares(&self.down)).max(0.0) + (down - self.down).norm_squared() * self.information
+        (squares(down) - squares(&self.down)).max(0.0) + self.seen_beyond(down)
+    }
+
+    /// The same of what was seen.
+    fn seen_beyond(&self, down: &Vector3<f64>) -> f64 {
+        let off = down - self.down;
+        off.dot(&(self.information * off))
     }
 
     /// The same of what was only expected, in squares of the scale at which it gives way.
     fn expected_beyond(&self, down: &Vector3<f64>) -> f64 {
-        Self { information: 0.0, ..*self }.squares_beyond(down) / HELD_SCALE.powi(2)
+        Self { information: Matrix3::zeros(), ..*self }.squares_beyond(down) / HELD_SCALE.powi(2)
     }
 
     /// What is left of this say if the vertical is `down`: all of what was seen, less of what was only expected.
@@ -84,18 +96,17 @@ impl Say {
     /// The squares of `down` beyond its own that are minimized: of what was only expected, no more than the square of the scale.
     fn cost(&self, down: &Vector3<f64>) -> f64 {
         let expected = self.expected_beyond(down);
-        let seen = (down - self.down).norm_squared() * self.information;
-        HELD_SCALE.powi(2) * expected / (1.0 + expected) + seen
+        HELD_SCALE.powi(2) * expected / (1.0 + expected) + self.seen_beyond(down)
     }
 
     /// Information about turns of `down` along the columns of `basis`.
     fn information(&self, basis: &Matrix3x2<f64>) -> Matrix2<f64> {
-        basis.tr_mul(&(self.moment * basis)) + Matrix2::identity() * self.information
+        basis.tr_mul(&((self.moment + self.information) * basis))
     }
 
     /// Half the gradient of the squares at `down` along the columns of `basis`.
     fn gradient(&self, down: &Vector3<f64>, basis: &Matrix3x2<f64>) -> Vector2<f64> {
-        basis.tr_mul(&(self.moment * down - self.down * self.information))
+        basis.tr_mul(&(self.moment * down + self.information * (down - self.down)))
     }
 
     /// Standard deviation in radians about the axis it tells least of.
@@ -111,7 +122,7 @@ pub(super) struct CameraLevel<'a> {
     pub rotations: &'a [Matrix3<f64>],
     /// By [`straighten`], as published.
     pub straightened: Straightened,
-    /// Down in the common frame, by the cameras and by recorded gravity.
+    /// Down in the common frame, by the cameras, by recorded gravity and by the far horizon.
     pub down: Vector3<f64>,
     /// Whether recorded gravity takes part.
     pub has_gravity: bool,
@@ -127,19 +138,38 @@ impl<'a> CameraLevel<'a> {
             photographs: rotations.len(),
             down: level,
             moment: level_moment(rotations, pitch_prior) / roll_variance(rotations, &level),
-            information: 0.0,
+            information: Matrix3::zeros(),
         };
         let gravity = gravity.map(|gravity| Say {
             source: LevelSource::Gravity,
             photographs: gravity.photographs,
             down: gravity.down,
             moment: Matrix3::zeros(),
-            information: gravity.deviation.powi(-2),
+            information: Matrix3::identity() * gravity.deviation.powi(-2),
         });
         let says: Vec<Say> = [Some(cameras), gravity].into_iter().flatten().collect();
         let has_gravity = gravity.is_some();
         let down = if has_gravity { combined(&says) } else { level };
         Self { rotations, straightened: straighten(rotations), down, has_gravity, says }
+    }
+
+    /// The same with a far horizon that was found.
+    pub(super) fn with_horizon(self, horizon: &FarHorizon) -> Self {
+        let mut says = self.says;
+        says.push(Say {
+            source: LevelSource::Horizon,
+            photographs: horizon.photographs,
+            down: horizon.down,
+            moment: Matrix3::zeros(),
+            information: horizon.information,
+        });
+        let down = combined(&says);
+        Self { down, says, ..self }
+    }
+
+    /// How many deviations of what is known without lines a vertical lies from its own.
+    pub(super) fn deviations_to(&self, down: &Vector3<f64>) -> f64 {
+        self.says.iter().map(|say| say.squares_beyond(down)).sum::<f64>().sqrt()
     }
 
     /// Standard deviation in radians of `down`, about the axis that is known worst.
@@ -157,7 +187,9 @@ impl<'a> CameraLevel<'a> {
             (false, true) => self.straightened.down,
             (false, false) => return None,
         };
-        let squares: f64 = self.says.iter().map(|say| say.squares_beyond(down)).sum();
+        // The horizon is compared with lines where both are weighed.
+        let held = self.says.iter().filter(|say| say.source != LevelSource::Horizon);
+        let squares: f64 = held.map(|say| say.squares_beyond(down)).sum();
         let rolls = mean_square_roll(self.rotations, down).sqrt();
         let pitch_is_untold = !self.has_gravity && self.rotations.len() == 2;
         Some(CameraAngle {
@@ -173,21 +205,26 @@ impl<'a> CameraLevel<'a> {
     }
 
     /// The vertical with what lines say of it, which deviates by `deviation` radians in `photographs` photographs, weighed in; and
-    /// what told of it.
+    /// what told of it. A far horizon that contradicts the lines does not count.
     pub(super) fn with_lines(
         &self,
         lines: &Vector3<f64>,
         deviation: f64,
         photographs: usize,
     ) -> (Vector3<f64>, Vec<LevelEvidence>) {
-        let mut says = vec![Say {
+        let contradicts = |say: &Say| {
+            let off = lines.angle(&say.down);
+            say.source == LevelSource::Horizon && off > MAX_HORIZON_DEVIATIONS * deviation.hypot(say.deviation())
+        };
+        let lines_say = Say {
             source: LevelSource::Lines,
             photographs,
             down: *lines,
             moment: Matrix3::zeros(),
-            information: deviation.powi(-2),
-        }];
-        says.extend_from_slice(&self.says);
+            information: Matrix3::identity() * deviation.powi(-2),
+        };
+        let others = self.says.iter().copied().filter(|say| !contradicts(say));
+        let says: Vec<Say> = std::iter::once(lines_say).chain(others).collect();
         let down = combined(&says);
         let evidence = evidence(&says, &down);
         (down, evidence)
@@ -335,6 +372,45 @@ mod tests {
         let from_cameras = |deviation_deg: f64| down(deviation_deg).angle(&Vector3::y()).to_degrees();
         assert!(from_cameras(10.0) < 0.5, "{}", from_cameras(10.0));
         assert!(from_cameras(3.0) > 13.0, "{}", from_cameras(3.0));
+    }
+
+    fn far_horizon(down: Vector3<f64>, deviation: f64) -> FarHorizon {
+        let about = Matrix3::identity() - down * down.transpose();
+        FarHorizon { down, information: about * deviation.powi(-2), photographs: 3 }
+    }
+
+    /// Cameras that all look up by 0.1 expect a level that is off by that, the horizon knows: it is surer by far.
+    #[test]
+    fn a_far_horizon_outweighs_how_cameras_are_held() {
+        let rotations: Vec<Matrix3<f64>> =
+            [-0.2, 0.2].map(|yaw| rotation_about_x(-0.1) * rotation_about_y(yaw)).to_vec();
+        let level = CameraLevel::new(&rotations, PITCH_PRIOR, None);
+        assert!(level.down.angle(&Vector3::y()) > 0.04, "{}", level.down);
+        let level = level.with_horizon(&far_horizon(Vector3::y(), 0.003));
+        assert!(level.down.angle(&Vector3::y()) < 0.001, "{}", level.down);
+        let evidence = level.evidence();
+        let [cameras, horizon] = evidence[..] else { panic!("two sources") };
+        assert_eq!((horizon.source, horizon.photographs), (LevelSource::Horizon, 3));
+        assert!(horizon.share > 0.95 && cameras.share < 0.05, "{evidence:?}");
+        assert!((horizon.deviation - 0.003).abs() < 1e-9);
+    }
+
+    /// Lines sure to 0.002 and a horizon sure to 0.004, 0.01 apart, are 2.2 deviations of both: the mean lies at a fifth, but for what the cameras tell. 0.05 apart are 11, and
+    /// the horizon is none.
+    #[test]
+    fn a_far_horizon_that_contradicts_the_lines_does_not_count() {
+        let rotations = all_round(0.0);
+        let with = |angle: f64| {
+            let down = rotation_about_x(angle) * Vector3::y();
+            let level = CameraLevel::new(&rotations, 0.0, None).with_horizon(&far_horizon(down, 0.004));
+            level.with_lines(&Vector3::y(), 0.002, 4)
+        };
+        let (down, evidence) = with(0.01);
+        assert!((down.angle(&Vector3::y()) - 0.002).abs() < 1e-4, "{}", down.angle(&Vector3::y()));
+        assert_eq!(evidence.len(), 3);
+        let (down, evidence) = with(0.05);
+        assert!(down.angle(&Vector3::y()) < 1e-9, "{}", down.angle(&Vector3::y()));
+        assert!(evidence.iter().all(|one| one.source != LevelSource::Horizon));
     }
 
     #[test]

@@ -59,6 +59,7 @@ use level::CameraLevel;
 use upright::{Upright, rolls};
 use vpg::Guided;
 
+use crate::far_horizon;
 use crate::straightening;
 
 pub use flat::of_flat_scene;
@@ -69,9 +70,14 @@ pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
 pub use printed::PrintedEquations;
 pub use prior::{Guidance, SimilarityPrior, VerticalSpread};
 
+/// Farthest that a far horizon may lie from what cameras and gravity tell, in their deviations.
+const FARTHEST_HORIZON: f64 = 5.0;
+/// The same in degrees: of two photographs cameras know next to nothing. Measured: of cut scenes with a horizon the cameras' level was off by 10 at most, roofs of two
+/// photographs were taken for one that is 22 off.
+const FARTHEST_HORIZON_DEG: f64 = 15.0;
 /// What a user can do when lines do not guide the panorama.
 const REFUSED_HINT: &str =
-    "The panorama is levelled by how its cameras were held; photographs that show upright edges level it better";
+    "What else tells which way is down levels the panorama; photographs that show upright edges level it better";
 
 /// Finds the similarity prior of a connected set of photographs.
 ///
@@ -92,6 +98,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
     let gravity = options.gravity.then(|| MeanGravity::of(&rotations, input.gravity)).flatten();
     let level = CameraLevel::new(&rotations, options.pitch_prior, gravity);
+    let level = with_far_horizon(level, input, options);
     let straightened = level.straightened.down;
     let unguided = |told: Vec<LevelEvidence>| {
         Guidance::none(input.cameras.len(), gate::allowed_divergence(input.cameras.len(), None, options), told)
@@ -133,6 +140,26 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
         roll: rolls(&upright.down, &upright.rotations),
         camera_from_world: upright.rotations.iter().map(rows_of).collect(),
     })
+}
+
+/// What is known of the vertical without lines, with the far horizon if the method asks for the vertical and the photographs show one beyond doubt.
+fn with_far_horizon<'a>(
+    level: CameraLevel<'a>,
+    input: &PriorInput<'_>,
+    options: &SimilarityOptions,
+) -> CameraLevel<'a> {
+    let asks = matches!(input.method, PriorMethod::VanishingPoints | PriorMethod::Straightening);
+    if !options.far_horizon || !asks {
+        return level;
+    }
+    let is_plausible = |down: &Vector3<f64>| {
+        let is_near = level.down.angle(down).to_degrees() <= FARTHEST_HORIZON_DEG;
+        is_near && level.deviations_to(down) <= FARTHEST_HORIZON
+    };
+    match far_horizon::find(input.shown, input.cameras, &level.down, is_plausible) {
+        Some(horizon) => level.with_horizon(&horizon),
+        None => level,
+    }
 }
 
 /// Straightened cameras.

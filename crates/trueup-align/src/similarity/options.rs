@@ -94,6 +94,9 @@ trueup_core::options! {
         /// Whether gravity that cameras recorded takes part in the vertical. Turn it off where a camera was tilted on purpose, or its
         /// sensor is wrong.
         gravity: bool = true, Allowed::Any, "";
+        /// Whether the far horizon of sea or plain takes part in the vertical, where photographs show it beyond doubt. Turn it off where what
+        /// looks like one is not level: a long wall or a dike before the sky.
+        far_horizon: bool = true, Allowed::Any, "";
         /// What stands in for vanishing directions that are not believed. `gsp-3d` to compare with the published method.
         fallback: Fallback = Fallback::Straightening, Allowed::Any, "";
         /// Equations of the paper that are taken as they are printed, joined by +, where this program corrects them; `all`

@@ -102,6 +102,7 @@ impl SyntheticScene {
             lines: &self.lines,
             frames: &self.frames,
             gravity: &[],
+            shown: &[],
             edges: &self.edges,
             overlaps: &[],
             cell_px: 40.0,

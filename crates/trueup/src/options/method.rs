@@ -80,6 +80,7 @@ fn fix_published_guidance(options: &mut AlignOptions) {
     similarity.pooled_search = false;
     similarity.vertical_only = false;
     similarity.gravity = false;
+    similarity.far_horizon = false;
     similarity.pitch_prior = 0.0;
 }
 

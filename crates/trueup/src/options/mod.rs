@@ -415,6 +415,7 @@ mod tests {
         let guidance = [
             "similarity.camera_correction",
             "similarity.fallback",
+            "similarity.far_horizon",
             "similarity.gate",
             "similarity.gravity",
             "similarity.guided_redetection",

@@ -199,7 +199,7 @@ pub enum LineGuide {
 /// What one source said of the vertical, and what it came to count for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LevelRecord {
-    /// Who says it: "lines", "gravity" that cameras recorded, or "cameras", that are expected to be held level.
+    /// Who says it: "lines", "gravity" that cameras recorded, the far "horizon", or "cameras", that are expected to be held level.
     pub source: LevelSource,
     /// How many photographs it rests on.
     pub photographs: usize,
@@ -219,6 +219,7 @@ impl LevelRecord {
         let who = match self.source {
             LevelSource::Lines => format!("lines in {}", count_of_photographs(self.photographs)),
             LevelSource::Gravity => format!("gravity that {} recorded", count_of_photographs(self.photographs)),
+            LevelSource::Horizon => format!("the far horizon in {}", count_of_photographs(self.photographs)),
             LevelSource::Cameras => "cameras held level".to_owned(),
         };
         // Up to the next tenth: what is sure to less is not told so surely.

@@ -3,11 +3,13 @@
 use std::path::Path;
 
 use trueup_align::cameras::CameraPrior;
+use trueup_align::far_horizon::ShownPhotograph;
 use trueup_align::mesh::{self, MeshOptions};
 use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
+
 use trueup_core::source::{FocalSource, RecordedGravity, SourceImage, WorkingFrame};
 
 use crate::pipeline::measured::Measured;
@@ -22,6 +24,8 @@ pub(crate) struct Component<'a> {
     pub lines: Vec<Vec<LineSegment>>,
     /// Edges of each photograph that may be straight lines of the scene.
     pub curves: Vec<&'a [EdgeCurve]>,
+    /// A small copy of each photograph, in color, with its frame.
+    pub thumbnails: Vec<(&'a Raster<u8>, &'a WorkingFrame)>,
     /// Gray values at the working size, for those that were kept.
     pub grays: Vec<Option<&'a Raster<u8>>>,
     pub pairs: Vec<PairMatches>,
@@ -53,6 +57,7 @@ impl<'a> Component<'a> {
             frames: members.iter().filter_map(known).map(|one| one.frame).collect(),
             lines: members.iter().filter_map(known).map(|one| one.lines.clone()).collect(),
             curves: members.iter().filter_map(known).map(|one| one.curves.as_slice()).collect(),
+            thumbnails: members.iter().filter_map(known).map(|one| (&one.thumbnail, &one.thumbnail_frame)).collect(),
             grays: members.iter().filter_map(known).map(|one| one.gray.as_ref()).collect(),
             pairs,
             reference: local(reference).unwrap_or(0),
@@ -82,6 +87,18 @@ impl<'a> Component<'a> {
     /// Which way each photograph's camera recorded as down, if it did.
     pub(super) fn gravity(&self) -> Vec<Option<RecordedGravity>> {
         self.images.iter().map(|image| image.gravity).collect()
+    }
+
+    /// What the far horizon is sought in.
+    pub(super) fn shown(&self) -> Vec<ShownPhotograph<'_>> {
+        let photographs = self.frames.iter().zip(&self.curves).zip(&self.thumbnails);
+        let shown = |((frame, &curves), &(thumbnail, thumbnail_frame))| ShownPhotograph {
+            frame,
+            curves,
+            thumbnail,
+            thumbnail_frame,
+        };
+        photographs.map(shown).collect()
     }
 
     /// Which photographs one camera took: [`camera_groups`].

@@ -185,6 +185,7 @@ fn find_prior(
         MethodForm::Mesh(prior, _) => prior,
         MethodForm::Warp(_) => PriorMethod::Straightening,
     };
+    let shown = component.shown();
     let input = PriorInput {
         method,
         cameras: &overlaps.cameras.cameras,
@@ -192,6 +193,7 @@ fn find_prior(
         lines,
         frames: &component.frames,
         gravity: &component.gravity(),
+        shown: &shown,
         edges: &overlaps.pairs,
         overlaps: &overlaps.warps,
         cell_px: component.cell_px(&options.mesh),
