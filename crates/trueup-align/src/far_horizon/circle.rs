@@ -1,8 +1,10 @@
 //! A circle of directions through edges: the plane of the horizon and how far below level it lies.
 
 use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
+use rayon::prelude::*;
 use trueup_core::geometry::{orthonormal_complement, wrap_angle};
 
 use super::edges::SkyEdge;
@@ -58,25 +60,19 @@ pub(super) fn through(edges: &[SkyEdge], expected: &Vector3<f64>) -> Vec<Horizon
     let curves = longest_curves(edges);
     // Among verticals so near to one another it hardly matters about which of them azimuth is counted.
     let steps: Vec<Vec<usize>> = edges.iter().map(|edge| steps_of(edge, expected)).collect();
-    let mut tried: Vec<(usize, Vector3<f64>)> = Vec::new();
-    for (k, one) in curves.iter().enumerate() {
-        for other in &curves[..=k] {
-            let Some(down) = plane_through(&[one, other], expected).filter(|down| down.angle(expected) <= MAX_TILT)
-            else {
-                continue;
-            };
-            let mut covered = [false; STEPS];
-            for (edge, steps) in edges.iter().zip(&steps) {
-                if is_near(edge, &down, 0.0, NEAR_TRIED) {
-                    steps.iter().for_each(|&step| covered[step] = true);
-                }
-            }
-            let covered = covered.iter().filter(|&&step| step).count();
-            if covered >= FEWEST_STEPS {
-                tried.push((covered, down));
-            }
+    let pairs: Vec<[&[SkyEdge]; 2]> =
+        curves.iter().enumerate().flat_map(|(k, one)| curves[..=k].iter().map(|other| [*one, *other])).collect();
+    let near = sines(0.0, NEAR_TRIED);
+    let covered_by = |pair: &[&[SkyEdge]; 2]| {
+        let down = plane_through(pair, expected).filter(|down| down.angle(expected) <= MAX_TILT)?;
+        let mut covered = [false; STEPS];
+        for (_, steps) in edges.iter().zip(&steps).filter(|(edge, _)| is_near(edge, &down, &near)) {
+            steps.iter().for_each(|&step| covered[step] = true);
         }
-    }
+        let covered = covered.iter().filter(|&&step| step).count();
+        (covered >= FEWEST_STEPS).then_some((covered, down))
+    };
+    let mut tried: Vec<(usize, Vector3<f64>)> = pairs.par_iter().filter_map(covered_by).collect();
     tried.sort_by_key(|one| std::cmp::Reverse(one.0));
     let mut circles: Vec<HorizonCircle> = Vec::new();
     for (_, down) in tried {
@@ -92,25 +88,22 @@ pub(super) fn through(edges: &[SkyEdge], expected: &Vector3<f64>) -> Vec<Horizon
     circles
 }
 
-/// The parts of the longest curves, longest first.
-fn longest_curves(edges: &[SkyEdge]) -> Vec<Vec<&SkyEdge>> {
-    let mut curves: Vec<Vec<&SkyEdge>> = Vec::new();
-    for edge in edges {
-        match curves.last_mut() {
-            Some(last) if last.iter().all(|one| (one.photograph, one.curve) == (edge.photograph, edge.curve)) => {
-                last.push(edge);
-            }
-            _ => curves.push(vec![edge]),
-        }
-    }
-    let length = |curve: &Vec<&SkyEdge>| curve.iter().map(|edge| edge.length()).sum::<f64>();
-    curves.sort_by(|one, other| length(other).total_cmp(&length(one)));
-    curves.truncate(MOST_CURVES);
-    curves
+/// The parts of the longest curves, longest first; those of a curve follow one another in `edges`.
+fn longest_curves(edges: &[SkyEdge]) -> Vec<&[SkyEdge]> {
+    let curves = edges.chunk_by(|one, next| (one.photograph, one.curve) == (next.photograph, next.curve));
+    let with_length = |curve| (length_of(curve), curve);
+    let mut curves: Vec<(f64, &[SkyEdge])> = curves.map(with_length).collect();
+    curves.sort_by(|one, other| other.0.total_cmp(&one.0));
+    curves.into_iter().map(|(_, curve)| curve).take(MOST_CURVES).collect()
+}
+
+/// Length of a curve's parts, radians.
+fn length_of(curve: &[SkyEdge]) -> f64 {
+    curve.iter().map(SkyEdge::length).sum()
 }
 
 /// The normal of the plane nearest to edges, on the side of `expected`.
-fn plane_through(curves: &[&Vec<&SkyEdge>], expected: &Vector3<f64>) -> Option<Vector3<f64>> {
+fn plane_through(curves: &[&[SkyEdge]; 2], expected: &Vector3<f64>) -> Option<Vector3<f64>> {
     let moment: Matrix3<f64> = curves
         .iter()
         .flat_map(|curve| curve.iter())
@@ -122,10 +115,14 @@ fn plane_through(curves: &[&Vec<&SkyEdge>], expected: &Vector3<f64>) -> Option<V
     Some(if normal.dot(expected) > 0.0 { normal } else { -normal })
 }
 
-/// Whether both ends of an edge lie within `near` of a circle.
-fn is_near(edge: &SkyEdge, down: &Vector3<f64>, dip: f64, near: f64) -> bool {
-    let (lowest, highest) = ((dip - near).sin(), (dip + near).sin());
-    edge.ends.iter().all(|end| (lowest..=highest).contains(&end.dot(down)))
+/// Sines of how far below level directions lie that are within `near` of a circle.
+fn sines(dip: f64, near: f64) -> RangeInclusive<f64> {
+    (dip - near).sin()..=(dip + near).sin()
+}
+
+/// Whether both ends of an edge lie so far below the level of `down`.
+fn is_near(edge: &SkyEdge, down: &Vector3<f64>, sines: &RangeInclusive<f64>) -> bool {
+    edge.ends.iter().all(|end| sines.contains(&end.dot(down)))
 }
 
 /// The edges that lie within `near` of a circle.
@@ -135,7 +132,8 @@ fn on_circle<'a>(
     dip: f64,
     near: f64,
 ) -> impl Iterator<Item = &'a SkyEdge> {
-    edges.iter().filter(move |edge| is_near(edge, down, dip, near))
+    let near = sines(dip, near);
+    edges.iter().filter(move |edge| is_near(edge, down, &near))
 }
 
 /// Which degrees of azimuth about `down` edges near a circle take.
@@ -206,10 +204,11 @@ impl HorizonCircle {
     /// What the circle tells of the vertical, whatever its dip, rad^-2.
     pub(super) fn information(&self) -> Matrix3<f64> {
         let basis = tangent(&self.down);
+        let variance = ALIKE_CELLS * self.scatter().powi(2);
         let mut normal: Matrix3<f64> = Matrix3::zeros();
         for (direction, _) in &self.cells {
             let row = derivative(direction, &basis);
-            normal += row * row.transpose() / (ALIKE_CELLS * self.scatter().powi(2));
+            normal += row * row.transpose() / variance;
         }
         normal[(2, 2)] += DIP_DEVIATION.powi(-2);
         // The dip is eliminated.
@@ -244,7 +243,7 @@ impl HorizonCircle {
     }
 }
 
-/// How the height of a direction over the circle changes with turns of down along `basis`, and with the dip.
+/// How the angle of a direction below the circle changes with turns of down along `basis`, and with the dip.
 fn derivative(direction: &Vector3<f64>, basis: &Matrix3x2<f64>) -> Vector3<f64> {
     let turns = basis.tr_mul(direction);
     Vector3::new(turns.x, turns.y, -1.0)

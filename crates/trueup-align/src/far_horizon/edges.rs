@@ -43,13 +43,13 @@ impl SkyEdge {
 pub(super) fn under_sky(photograph: usize, view: &View<'_>, down: &Vector3<f64>) -> Vec<SkyEdge> {
     let mut edges = Vec::new();
     for (curve, edge) in view.curves.iter().enumerate() {
-        let [Some(&first), Some(&last)] = [edge.places.first(), edge.places.last()] else { continue };
-        if !is_level([view.direction(first), view.direction(last)], down) {
+        let [Some(first), Some(last)] = [edge.places.first(), edge.places.last()] else { continue };
+        if !is_level([first, last].map(|&place| view.direction(place)), down) {
             continue;
         }
         let directions: Vec<Vector3<f64>> = edge.places.iter().map(|&place| view.direction(place)).collect();
         // The sides of the last place looked at: most are looked at once, though they end two parts.
-        let mut last: Option<(usize, Option<Sides>)> = None;
+        let mut looked: Option<(usize, Option<Sides>)> = None;
         for (place, ends) in directions.windows(2).enumerate() {
             if !is_level([ends[0], ends[1]], down) {
                 continue;
@@ -62,9 +62,9 @@ pub(super) fn under_sky(photograph: usize, view: &View<'_>, down: &Vector3<f64>)
                 };
                 sides.filter(is_even_above)
             };
-            let one = last.filter(|(at, _)| *at == place).map_or_else(|| look(place), |(_, sides)| sides);
+            let one = looked.filter(|(at, _)| *at == place).map_or_else(|| look(place), |(_, sides)| sides);
             let other = look(place + 1);
-            last = Some((place + 1, other));
+            looked = Some((place + 1, other));
             if let (Some(one), Some(other)) = (one, other) {
                 edges.push(SkyEdge {
                     photograph,

@@ -17,6 +17,7 @@ mod view;
 mod tests;
 
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 use trueup_core::camera::Camera;
 use trueup_core::lines::EdgeCurve;
 use trueup_core::raster::Raster;
@@ -59,8 +60,8 @@ pub fn find(
     is_plausible: impl Fn(&Vector3<f64>) -> bool,
 ) -> Option<FarHorizon> {
     let views: Vec<View> = photographs.iter().zip(cameras).map(|(shown, camera)| View::new(shown, camera)).collect();
-    let edges: Vec<SkyEdge> =
-        views.iter().enumerate().flat_map(|(index, view)| edges::under_sky(index, view, expected)).collect();
+    let under_sky = |(index, view)| edges::under_sky(index, view, expected);
+    let edges: Vec<SkyEdge> = views.par_iter().enumerate().flat_map_iter(under_sky).collect();
     for circle in circle::through(&edges, expected) {
         let evidence = HorizonEvidence::along(&circle, &edges, &views);
         if evidence.is_beyond_doubt() {

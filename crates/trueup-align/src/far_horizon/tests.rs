@@ -171,3 +171,15 @@ fn too_little_of_a_horizon_does_not_tell() {
     assert!(found(&without).is_none());
     assert!(find(&[], &[], &Vector3::y(), |_| true).is_none());
 }
+
+/// A camera that looks at rocks alone, away from the others, sees none of it, and of a small copy that is smaller than it says the last pixels stand for what is missing.
+#[test]
+fn views_of_something_else_do_not_tell() {
+    let held = taken(&SEA, &[-60.0, -30.0, 0.0, 120.0]);
+    assert_eq!(found(&held).expect("a horizon").photographs, 3);
+    for (width, height, channels) in [(0, 0, 3), (1, 1, 3), (1, 1, 1), (200, 1, 3)] {
+        let mut other = taken(&SEA, &ROW);
+        other.thumbnails.iter_mut().for_each(|thumbnail| *thumbnail = Raster::new(width, height, channels));
+        assert!(found(&other).is_none());
+    }
+}

@@ -88,7 +88,9 @@ impl<'a> View<'a> {
     pub(super) fn largest_step_up(&self, direction: &Vector3<f64>, down: &Vector3<f64>, sides: &Sides) -> f64 {
         let Some(downward) = (down - direction * down.dot(direction)).try_normalize(f64::EPSILON) else { return 0.0 };
         let (mut last, mut largest) = (sides.above[SAMPLES - 1], 0.0_f64);
-        for height in FAR_UP {
+        // Pixels of a small copy with a short focal length are so wide that the outermost color is from beyond the first of these.
+        let outermost = DISTANCES[SAMPLES - 1] * self.nearest;
+        for height in FAR_UP.into_iter().filter(|height| *height > outermost) {
             let (sine, cosine) = height.sin_cos();
             let Some(color) = self.color(&(direction * cosine - downward * sine)) else { break };
             largest = largest.max(difference(&color, &last));

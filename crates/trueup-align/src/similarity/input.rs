@@ -63,7 +63,7 @@ impl PriorInput<'_> {
         let lengths = [input.triads.len(), input.lines.len(), input.frames.len(), gravity, shown];
         if lengths.iter().any(|&length| length != count) {
             return unsolvable(format!(
-                "cameras, triads, segments, frames, gravity and edges differ in number from {count}"
+                "cameras, triads, segments, frames, gravity and what photographs show differ in number from {count}"
             ));
         }
         if let Some(edge) = input.edges.iter().find(|edge| edge.a >= count || edge.b >= count || edge.a == edge.b) {

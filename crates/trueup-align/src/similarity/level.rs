@@ -26,6 +26,8 @@ const HELD_SCALE: f64 = 2.0;
 /// A far horizon farther from the vertical of lines that may guide than so many deviations of both is none: what lines agree on is seen as well, and in
 /// most scenes by more photographs.
 const MAX_HORIZON_DEVIATIONS: f64 = 4.0;
+/// Least standard deviation of a vertical, radians: what directions in double precision tell apart. A jackknife over lines that leave a frame where it is finds none.
+const LEAST_DEVIATION: f64 = 1.5e-8;
 /// Steps toward the vertical of least squares. Where the cameras' level is far off, it takes several to do without it.
 const STEPS: usize = 20;
 
@@ -124,6 +126,8 @@ pub(super) struct CameraLevel<'a> {
     pub straightened: Straightened,
     /// Down in the common frame, by the cameras, by recorded gravity and by the far horizon.
     pub down: Vector3<f64>,
+    /// The same without the far horizon.
+    held: Vector3<f64>,
     /// Whether recorded gravity takes part.
     pub has_gravity: bool,
     says: Vec<Say>,
@@ -150,7 +154,7 @@ impl<'a> CameraLevel<'a> {
         let says: Vec<Say> = [Some(cameras), gravity].into_iter().flatten().collect();
         let has_gravity = gravity.is_some();
         let down = if has_gravity { combined(&says) } else { level };
-        Self { rotations, straightened: straighten(rotations), down, has_gravity, says }
+        Self { rotations, straightened: straighten(rotations), down, held: down, has_gravity, says }
     }
 
     /// The same with a far horizon that was found.
@@ -178,16 +182,16 @@ impl<'a> CameraLevel<'a> {
         greatest_deviation(&information(&heeded, &self.down))
     }
 
-    /// How far a vertical lies from the one that the cameras tell: by recorded gravity; of two photographs, whose x axes contradict nothing, by
-    /// `down`; or by straightening as published if the cameras fix that.
+    /// How far a vertical lies from the one that the cameras tell, without the far horizon: with recorded gravity; of two photographs, whose x axes
+    /// contradict nothing, as they expect to be held; or by straightening as published if the cameras fix that. The horizon is compared with lines where
+    /// both are weighed.
     pub(super) fn angle_to(&self, down: &Vector3<f64>) -> Option<CameraAngle> {
         let own = match (self.has_gravity, self.straightened.conditioned) {
-            (true, _) => self.down,
-            (false, _) if self.rotations.len() == 2 => self.down,
+            (true, _) => self.held,
+            (false, _) if self.rotations.len() == 2 => self.held,
             (false, true) => self.straightened.down,
             (false, false) => return None,
         };
-        // The horizon is compared with lines where both are weighed.
         let held = self.says.iter().filter(|say| say.source != LevelSource::Horizon);
         let squares: f64 = held.map(|say| say.squares_beyond(down)).sum();
         let rolls = mean_square_roll(self.rotations, down).sqrt();
@@ -204,18 +208,30 @@ impl<'a> CameraLevel<'a> {
         evidence(&self.says, &self.down)
     }
 
+    /// The same without the far horizon.
+    pub(super) fn without_horizon(&self) -> Self {
+        let held = self.says.iter().copied().filter(|say| say.source != LevelSource::Horizon);
+        Self { down: self.held, says: held.collect(), ..*self }
+    }
+
+    /// The same without a far horizon that contradicts `lines` that may guide, whose vertical deviates by `deviation` radians.
+    pub(super) fn without_contradicted_horizon(&self, lines: &Vector3<f64>, deviation: f64) -> Self {
+        let contradicts = |say: &Say| {
+            let off = lines.angle(&say.down);
+            say.source == LevelSource::Horizon && off > MAX_HORIZON_DEVIATIONS * deviation.hypot(say.deviation())
+        };
+        if self.says.iter().any(contradicts) { self.without_horizon() } else { self.clone() }
+    }
+
     /// The vertical with what lines say of it, which deviates by `deviation` radians in `photographs` photographs, weighed in; and
-    /// what told of it. A far horizon that contradicts the lines does not count.
+    /// what told of it, the lines first.
     pub(super) fn with_lines(
         &self,
         lines: &Vector3<f64>,
         deviation: f64,
         photographs: usize,
     ) -> (Vector3<f64>, Vec<LevelEvidence>) {
-        let contradicts = |say: &Say| {
-            let off = lines.angle(&say.down);
-            say.source == LevelSource::Horizon && off > MAX_HORIZON_DEVIATIONS * deviation.hypot(say.deviation())
-        };
+        let deviation = deviation.clamp(LEAST_DEVIATION, f64::INFINITY);
         let lines_say = Say {
             source: LevelSource::Lines,
             photographs,
@@ -223,8 +239,7 @@ impl<'a> CameraLevel<'a> {
             moment: Matrix3::zeros(),
             information: Matrix3::identity() * deviation.powi(-2),
         };
-        let others = self.says.iter().copied().filter(|say| !contradicts(say));
-        let says: Vec<Say> = std::iter::once(lines_say).chain(others).collect();
+        let says: Vec<Say> = std::iter::once(lines_say).chain(self.says.iter().copied()).collect();
         let down = combined(&says);
         let evidence = evidence(&says, &down);
         (down, evidence)
@@ -403,14 +418,41 @@ mod tests {
         let with = |angle: f64| {
             let down = rotation_about_x(angle) * Vector3::y();
             let level = CameraLevel::new(&rotations, 0.0, None).with_horizon(&far_horizon(down, 0.004));
-            level.with_lines(&Vector3::y(), 0.002, 4)
+            level.without_contradicted_horizon(&Vector3::y(), 0.002).with_lines(&Vector3::y(), 0.002, 4)
         };
         let (down, evidence) = with(0.01);
         assert!((down.angle(&Vector3::y()) - 0.002).abs() < 1e-4, "{}", down.angle(&Vector3::y()));
         assert_eq!(evidence.len(), 3);
+        // Heard all the same, it counts for a fifth as before.
+        let contradicted = rotation_about_x(0.05) * Vector3::y();
+        let level = CameraLevel::new(&rotations, 0.0, None).with_horizon(&far_horizon(contradicted, 0.004));
+        let (down, evidence) = level.with_lines(&Vector3::y(), 0.002, 4);
+        assert!((down.angle(&Vector3::y()) - 0.01).abs() < 5e-4, "{}", down.angle(&Vector3::y()));
+        assert_eq!(evidence.len(), 3);
         let (down, evidence) = with(0.05);
         assert!(down.angle(&Vector3::y()) < 1e-9, "{}", down.angle(&Vector3::y()));
         assert!(evidence.iter().all(|one| one.source != LevelSource::Horizon));
+    }
+
+    /// The gate asks how far lines lie from how two photographs are held, 0.3, wherever a horizon is.
+    #[test]
+    fn lines_are_compared_with_cameras_without_the_horizon() {
+        let rotations = [-0.2, 0.2].map(rotation_about_y);
+        let horizon = far_horizon(rotation_about_x(-0.2) * Vector3::y(), 0.003);
+        let level = CameraLevel::new(&rotations, PITCH_PRIOR, None).with_horizon(&horizon);
+        assert!(level.down.angle(&horizon.down) < 0.01, "{}", level.down);
+        let angle = level.angle_to(&(rotation_about_x(0.3) * Vector3::y())).expect("two photographs").angle;
+        assert!((angle - 0.3).abs() < 1e-9, "{angle}");
+        assert!(level.without_horizon().down.angle(&Vector3::y()) < 1e-9);
+    }
+
+    #[test]
+    fn lines_that_do_not_scatter_are_believed() {
+        let rotations = all_round(0.0);
+        let lines = rotation_about_x(0.02) * Vector3::y();
+        let (down, evidence) = CameraLevel::new(&rotations, PITCH_PRIOR, None).with_lines(&lines, 0.0, 4);
+        assert!(down.angle(&lines) < 1e-9, "{down}");
+        assert!(evidence[0].share > 0.999, "{evidence:?}");
     }
 
     #[test]

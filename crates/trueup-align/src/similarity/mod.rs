@@ -70,8 +70,9 @@ pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
 pub use printed::PrintedEquations;
 pub use prior::{Guidance, SimilarityPrior, VerticalSpread};
 
-/// Farthest that a far horizon may lie from what cameras and gravity tell, in their deviations.
-const FARTHEST_HORIZON: f64 = 5.0;
+/// Farthest that a far horizon may lie from what cameras and gravity tell, in their deviations. Reasoned: nothing keeps photographers from tilting all photographs
+/// alike, which their rolls do not tell.
+const FARTHEST_HORIZON_DEVIATIONS: f64 = 5.0;
 /// The same in degrees: of two photographs cameras know next to nothing. Measured: of cut scenes with a horizon the cameras' level was off by 10 at most, roofs of two
 /// photographs were taken for one that is 22 off.
 const FARTHEST_HORIZON_DEG: f64 = 15.0;
@@ -154,7 +155,7 @@ fn with_far_horizon<'a>(
     }
     let is_plausible = |down: &Vector3<f64>| {
         let is_near = level.down.angle(down).to_degrees() <= FARTHEST_HORIZON_DEG;
-        is_near && level.deviations_to(down) <= FARTHEST_HORIZON
+        is_near && level.deviations_to(down) <= FARTHEST_HORIZON_DEVIATIONS
     };
     match far_horizon::find(input.shown, input.cameras, &level.down, is_plausible) {
         Some(horizon) => level.with_horizon(&horizon),

@@ -77,14 +77,14 @@ pub(super) fn guide(
     let count = input.cameras.len();
     let mut scene = SceneDirections::new(input, level, options);
     context.check_cancelled()?;
-    let mut guidance = Guidance::none(count, allowed_divergence(count, None, options), level.evidence());
     let mut generator = context.generator(SimilarityOptions::STAGE, 0);
     let cut = if options.as_printed.dominant { f64::INFINITY } else { options.rejection };
     let dominant = dominant_frame(&scene.triads, cut, &mut generator);
     context.check_cancelled()?;
     let pooled = options.pooled_search.then(|| search_frames(&scene.vote, &level.down)).flatten();
-    guidance.significance = pooled.as_ref().map(|pooled| pooled.significance);
-    guidance.threshold = allowed_divergence(count, guidance.significance, options);
+    let significance = pooled.as_ref().map(|pooled| pooled.significance);
+    let allowed = allowed_divergence(count, significance, options);
+    let mut guidance = Guidance { significance, ..Guidance::none(count, allowed, level.evidence()) };
     guidance.failed_clause = match &dominant {
         Some(dominant) => scene.judge(dominant, &mut guidance),
         None => Some("no photograph has vanishing directions".to_owned()),
@@ -297,8 +297,9 @@ impl<'a> SceneDirections<'a> {
             ));
             return Err(self.level.down);
         }
-        let angle = lines.angle(&self.level.down);
-        let allowed = MAX_GRAVITY_DEVIATIONS * deviation.hypot(self.level.deviation());
+        let recorded = self.level.without_horizon();
+        let angle = lines.angle(&recorded.down);
+        let allowed = MAX_GRAVITY_DEVIATIONS * deviation.hypot(recorded.deviation());
         let allowed = allowed.max(MAX_GRAVITY_ANGLE_DEG.to_radians());
         if self.level.has_gravity && angle > allowed {
             guidance.pooled = false;
@@ -311,12 +312,16 @@ impl<'a> SceneDirections<'a> {
         }
         // Also of photographs whose own directions do not agree, lines may.
         let telling = self.vote.support(lines, joint::TOLERANCE_DEG.to_radians()).photographs;
-        let (down, evidence) = self.level.with_lines(lines, deviation, telling);
+        let believed = self.level.without_contradicted_horizon(lines, deviation);
+        let (down, evidence) = believed.with_lines(lines, deviation, telling);
         let outweigh = evidence.first().is_some_and(|lines| lines.share >= GUIDING_SHARE);
-        guidance.level = evidence;
         if outweigh && degrees <= MAX_GUIDING_DEVIATION_DEG {
+            guidance.level = evidence;
             return Ok(down);
         }
+        // A horizon that they contradict counts beside lines that do not guide.
+        let (down, evidence) = self.level.with_lines(lines, deviation, telling);
+        guidance.level = evidence;
         guidance.pooled = false;
         let limit = match outweigh {
             true => format!("({MAX_GUIDING_DEVIATION_DEG:.1} allowed)"),

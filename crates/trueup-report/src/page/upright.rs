@@ -50,7 +50,7 @@ fn guidance(project: &Project) -> String {
             project.used()
         ),
         None => format!(
-            "Vanishing points did not guide this panorama{}. It is upright as far as the camera was held level.",
+            "Vanishing points did not guide this panorama{}. What else tells which way is down levels it.",
             found.refusal_in_words()
         ),
     };

@@ -174,7 +174,7 @@ pub struct ManhattanRecord {
     /// By how much the scene's level lines lie along a slope, degrees: these do not count. `None` where they agree with the upright ones.
     #[serde(default)]
     pub slope_deg: Option<f64>,
-    /// The clause of the gate that the photographs' own directions failed, in words.
+    /// Why the photographs' own directions did not guide, in words; where all lines together were asked in their place and left the vertical open, why these did not.
     pub failed_clause: Option<String>,
     /// Dominant directions as columns, in the levelled world.
     pub dominant: Option<[[f64; 3]; 3]>,

@@ -9,7 +9,6 @@ use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
-
 use trueup_core::source::{FocalSource, RecordedGravity, SourceImage, WorkingFrame};
 
 use crate::pipeline::measured::Measured;
