@@ -1,6 +1,8 @@
-//! Statistics that few wild values do not move.
+//! Statistics that few wild values do not move, and how sure an estimate of two numbers is.
 
 use std::cmp::Ordering;
+
+use nalgebra::Matrix2;
 
 /// Standard deviation of a normal distribution over the median magnitude of what is drawn from it: 1 / Phi^-1(3/4).
 ///
@@ -35,6 +37,11 @@ pub fn median<T: TotalOrder>(values: &mut [T]) -> Option<T> {
 /// [`median`] of what an iterator yields.
 pub fn median_of<T: TotalOrder>(values: impl IntoIterator<Item = T>) -> Option<T> {
     median(&mut values.into_iter().collect::<Vec<T>>())
+}
+
+/// Standard deviation about the axis of which an information matrix (the inverse of a covariance) tells least; infinite where it tells nothing of it.
+pub fn greatest_deviation(information: &Matrix2<f64>) -> f64 {
+    information.symmetric_eigenvalues().min().max(0.0).sqrt().recip()
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use std::ops::RangeInclusive;
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use rayon::prelude::*;
-use trueup_core::geometry::{orthonormal_complement, wrap_angle};
+use trueup_core::geometry::{orthonormal_complement, tangent_basis, wrap_angle};
+use trueup_core::statistics::greatest_deviation;
 
 use super::edges::SkyEdge;
 
@@ -174,7 +175,7 @@ impl HorizonCircle {
         let (mut down, mut dip) = (down, 0.0);
         for round in 0..ROUNDS {
             let near = if round < ROUNDS / 2 { NEAR_TRIED } else { NEAR };
-            let basis = tangent(&down);
+            let basis = tangent_basis(&down);
             let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
             for edge in on_circle(edges, &down, dip, near) {
                 let middle = edge.middle();
@@ -203,7 +204,7 @@ impl HorizonCircle {
 
     /// What the circle tells of the vertical, whatever its dip, rad^-2.
     pub(super) fn information(&self) -> Matrix3<f64> {
-        let basis = tangent(&self.down);
+        let basis = tangent_basis(&self.down);
         let variance = ALIKE_CELLS * self.scatter().powi(2);
         let mut normal: Matrix3<f64> = Matrix3::zeros();
         for (direction, _) in &self.cells {
@@ -221,9 +222,8 @@ impl HorizonCircle {
 
     /// Standard deviation in radians of the vertical, about the axis that the circle tells least of.
     pub(super) fn deviation(&self) -> f64 {
-        let basis = tangent(&self.down);
-        let information = basis.tr_mul(&(self.information() * basis));
-        information.symmetric_eigenvalues().min().max(0.0).sqrt().recip()
+        let basis = tangent_basis(&self.down);
+        greatest_deviation(&basis.tr_mul(&(self.information() * basis)))
     }
 
     /// The directions of the circle, one for each degree of azimuth.
@@ -247,11 +247,6 @@ impl HorizonCircle {
 fn derivative(direction: &Vector3<f64>, basis: &Matrix3x2<f64>) -> Vector3<f64> {
     let turns = basis.tr_mul(direction);
     Vector3::new(turns.x, turns.y, -1.0)
-}
-
-fn tangent(down: &Vector3<f64>) -> Matrix3x2<f64> {
-    let (first, second) = orthonormal_complement(down);
-    Matrix3x2::from_columns(&[first, second])
 }
 
 /// Mean residuals of the cells of azimuth that edges take at least half of.

@@ -55,12 +55,8 @@ pub(super) fn under_sky(photograph: usize, view: &View<'_>, down: &Vector3<f64>)
                 continue;
             }
             let look = |at: usize| {
-                let sides = if view.is_brighter_above(&directions[at], down) {
-                    view.sides(&directions[at], down)
-                } else {
-                    None
-                };
-                sides.filter(is_even_above)
+                let is_brighter = view.is_brighter_above(&directions[at], down);
+                is_brighter.then(|| view.sides(&directions[at], down)).flatten().filter(is_even_above)
             };
             let one = looked.filter(|(at, _)| *at == place).map_or_else(|| look(place), |(_, sides)| sides);
             let other = look(place + 1);

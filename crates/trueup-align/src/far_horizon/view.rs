@@ -62,9 +62,8 @@ impl<'a> View<'a> {
 
     /// Whether what lies next to `direction` is brighter above than below, so that a look at more of it is worth its time.
     pub(super) fn is_brighter_above(&self, direction: &Vector3<f64>, down: &Vector3<f64>) -> bool {
-        let Some(downward) = (down - direction * down.dot(direction)).try_normalize(f64::EPSILON) else { return false };
-        let (sine, cosine) = self.nearest.sin_cos();
-        let beside = [-sine, sine].map(|aside| self.color(&(direction * cosine + downward * aside)));
+        let Some(downward) = downward(direction, down) else { return false };
+        let beside = [-self.nearest, self.nearest].map(|angle| self.color_beside(direction, &downward, angle));
         let [Some(above), Some(below)] = beside else { return false };
         // The colors are those of pixels: whole numbers of eight bits.
         let [above, below] = [above, below].map(|color| luma_256ths(color.map(|one| one as u8).into()));
@@ -73,12 +72,12 @@ impl<'a> View<'a> {
 
     /// The colors on both sides of `direction`, toward `-down` and `down`; `None` where the photograph does not show them all.
     pub(super) fn sides(&self, direction: &Vector3<f64>, down: &Vector3<f64>) -> Option<Sides> {
-        let downward = (down - direction * down.dot(direction)).try_normalize(f64::EPSILON)?;
+        let downward = downward(direction, down)?;
         let mut sides = Sides { above: [Color::zeros(); SAMPLES], below: [Color::zeros(); SAMPLES] };
         for (k, distance) in DISTANCES.iter().enumerate() {
-            let (sine, cosine) = (distance * self.nearest).sin_cos();
-            sides.above[k] = self.color(&(direction * cosine - downward * sine))?;
-            sides.below[k] = self.color(&(direction * cosine + downward * sine))?;
+            let angle = distance * self.nearest;
+            sides.above[k] = self.color_beside(direction, &downward, -angle)?;
+            sides.below[k] = self.color_beside(direction, &downward, angle)?;
         }
         Some(sides)
     }
@@ -86,17 +85,22 @@ impl<'a> View<'a> {
     /// The largest difference between neighbors among colors of which the first is the outermost above, and the others lie farther up, as far as the
     /// photograph shows them.
     pub(super) fn largest_step_up(&self, direction: &Vector3<f64>, down: &Vector3<f64>, sides: &Sides) -> f64 {
-        let Some(downward) = (down - direction * down.dot(direction)).try_normalize(f64::EPSILON) else { return 0.0 };
+        let Some(downward) = downward(direction, down) else { return 0.0 };
         let (mut last, mut largest) = (sides.above[SAMPLES - 1], 0.0_f64);
         // Pixels of a small copy with a short focal length are so wide that the outermost color is from beyond the first of these.
         let outermost = DISTANCES[SAMPLES - 1] * self.nearest;
         for height in FAR_UP.into_iter().filter(|height| *height > outermost) {
-            let (sine, cosine) = height.sin_cos();
-            let Some(color) = self.color(&(direction * cosine - downward * sine)) else { break };
+            let Some(color) = self.color_beside(direction, &downward, -height) else { break };
             largest = largest.max(difference(&color, &last));
             last = color;
         }
         largest
+    }
+
+    /// The color `angle` radians from `direction` toward `downward`, which is orthogonal to it.
+    fn color_beside(&self, direction: &Vector3<f64>, downward: &Vector3<f64>, angle: f64) -> Option<Color> {
+        let (sine, cosine) = angle.sin_cos();
+        self.color(&(direction * cosine + downward * sine))
     }
 
     fn color(&self, direction: &Vector3<f64>) -> Option<Color> {
@@ -136,6 +140,11 @@ impl Sides {
     pub(super) fn are_all_like(&self, sky: &Color, most: f64) -> bool {
         self.above.iter().chain(&self.below).all(|color| difference(color, sky) <= most)
     }
+}
+
+/// Where `down` is seen from `direction`: the unit vector orthogonal to this.
+fn downward(direction: &Vector3<f64>, down: &Vector3<f64>) -> Option<Vector3<f64>> {
+    (down - direction * down.dot(direction)).try_normalize(f64::EPSILON)
 }
 
 fn difference(one: &Color, other: &Color) -> f64 {

@@ -6,7 +6,8 @@
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
-use trueup_core::geometry::orthonormal_complement;
+use trueup_core::geometry::tangent_basis;
+use trueup_core::statistics::greatest_deviation;
 
 use super::gate::CameraAngle;
 use super::gravity::MeanGravity;
@@ -113,7 +114,7 @@ impl Say {
 
     /// Standard deviation in radians about the axis it tells least of.
     fn deviation(&self) -> f64 {
-        greatest_deviation(&self.information(&tangent(&self.down)))
+        greatest_deviation(&self.information(&tangent_basis(&self.down)))
     }
 }
 
@@ -273,7 +274,7 @@ fn combined(says: &[Say]) -> Vector3<f64> {
 fn descended(says: &[Say], start: &Vector3<f64>) -> Vector3<f64> {
     let mut down = *start;
     for _ in 0..STEPS {
-        let basis = tangent(&down);
+        let basis = tangent_basis(&down);
         let says: Vec<Say> = says.iter().map(|say| say.heeded(&down)).collect();
         let gradient: Vector2<f64> = says.iter().map(|say| say.gradient(&down, &basis)).sum();
         let Some(covariance) = information(&says, &down).try_inverse() else { break };
@@ -284,22 +285,13 @@ fn descended(says: &[Say], start: &Vector3<f64>) -> Vector3<f64> {
 
 /// What the sources tell together of turns of `down` about its two tangents.
 fn information(says: &[Say], down: &Vector3<f64>) -> Matrix2<f64> {
-    let basis = tangent(down);
+    let basis = tangent_basis(down);
     says.iter().map(|say| say.information(&basis)).sum()
-}
-
-fn tangent(down: &Vector3<f64>) -> Matrix3x2<f64> {
-    let (first, second) = orthonormal_complement(down);
-    Matrix3x2::from_columns(&[first, second])
-}
-
-fn greatest_deviation(information: &Matrix2<f64>) -> f64 {
-    information.symmetric_eigenvalues().min().max(0.0).sqrt().recip()
 }
 
 /// Shares are of the trace of the information.
 fn evidence(says: &[Say], down: &Vector3<f64>) -> Vec<LevelEvidence> {
-    let basis = tangent(down);
+    let basis = tangent_basis(down);
     let traces: Vec<f64> = says.iter().map(|say| say.heeded(down).information(&basis).trace()).collect();
     let total: f64 = traces.iter().sum();
     let of_say = |(say, trace): (&Say, &f64)| LevelEvidence {

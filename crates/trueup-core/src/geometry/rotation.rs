@@ -1,6 +1,6 @@
 //! Rotations of space as 3 x 3 matrices.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix3x2, Vector3};
 use rand::{Rng, RngExt};
 
 /// The cross product with v as a matrix: `cross_matrix(v) * w == v.cross(w)`.
@@ -30,6 +30,12 @@ pub fn orthonormal_complement(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64
     let helper = Vector3::ith(axis.iamin(), 1.0);
     let first = axis.cross(&helper).normalize();
     (first, axis.cross(&first))
+}
+
+/// The same two as columns: turns of `axis` by small angles are this times two numbers, and what a symmetric matrix M says of them is basis^T M basis.
+pub fn tangent_basis(axis: &Vector3<f64>) -> Matrix3x2<f64> {
+    let (first, second) = orthonormal_complement(axis);
+    Matrix3x2::from_columns(&[first, second])
 }
 
 /// The rotation by |v| radians about v (Rodrigues).
