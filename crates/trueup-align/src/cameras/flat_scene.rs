@@ -33,6 +33,9 @@ const EXPLAINED_PX: f64 = 3.0;
 const LEAST_EXPLAINED: f64 = 0.95;
 /// The same of every single photograph.
 const LEAST_EXPLAINED_OF_EACH: f64 = 0.85;
+/// Share of all matches that homographies of each pair alone explain where a plane may explain [`LEAST_EXPLAINED`]: what a plane carries from one
+/// photograph into another is a homography but for their lenses, which may bend a tenth of the matches away.
+const LEAST_EXPLAINED_PAIR_BY_PAIR: f64 = 0.85;
 /// Times that rotating cameras' residual is that of the plane where it is clearly better.
 const CLEARLY_BETTER: f64 = 2.0;
 /// Root mean square residual of rotating cameras, in working pixels, that is more than noise.
@@ -142,10 +145,15 @@ pub(super) fn find(
     let is_bad = input.priors.len() >= FEWEST
         && rotating.rms_px > MORE_THAN_NOISE_PX
         && (is_recorded || is_longer_than(LONGEST_BESIDE_SCANS))
-        && rotating.rms_px > CLEARLY_BETTER * by_homographies(input).rms_px;
+        && {
+            let pair_by_pair = by_homographies(input);
+            pair_by_pair.explained >= LEAST_EXPLAINED_PAIR_BY_PAIR
+                && rotating.rms_px > CLEARLY_BETTER * pair_by_pair.rms_px
+        };
     // From no place before a plane is more than half of all directions seen.
     let are_all_round = rotating.rms_px <= MORE_THAN_NOISE_PX && look_all_round(input.rotating);
-    if !(told || is_bad || is_longer_than(LONGEST_BESIDE_SCANS) && !are_all_round) {
+    let may_be_scans = told || is_longer_than(LONGEST_BESIDE_SCANS);
+    if !(told || is_bad || may_be_scans && !are_all_round) {
         return Ok(None);
     }
     let search = PlaneSearch::new(input, options, context);
@@ -159,15 +167,15 @@ pub(super) fn find(
         rotating_focal,
         straight_on,
     };
-    let scans = search.straight_on()?;
+    let scans = if may_be_scans { search.straight_on()? } else { None };
     let tilted = search.tilted()?;
     let tilted = tilted.map(|cameras| (of_plane(&cameras), cameras));
     if let Some(cameras) = scans.filter(|cameras| is_at_one_scale(cameras)) {
         let plane = of_plane(&cameras);
         let as_good_as_tilted = tilted.as_ref().is_none_or(|(tilted, _)| plane.rms_px <= AS_GOOD * tilted.rms_px);
         let as_good_as_rotating = plane.rms_px <= AS_GOOD * rotating.rms_px;
-        let is_unbelieved = is_longer_than(LONGEST_BESIDE_SCANS) && as_good_as_rotating;
-        if as_good_as_tilted && (told || is_unbelieved && plane.explained >= LEAST_EXPLAINED_OF_SCANS) {
+        let is_explained = plane.explained >= LEAST_EXPLAINED_OF_SCANS;
+        if as_good_as_tilted && (told || as_good_as_rotating && is_explained) {
             return Ok(Some(FlatScene { cameras, evidence: evidence(&plane, true), turned_by_lines: None }));
         }
     }
