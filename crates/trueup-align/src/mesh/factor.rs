@@ -21,10 +21,6 @@ use super::normal_equations::PlacedBlock;
 /// size have so many.
 const MOST_DOUBLES: usize = 1 << 24;
 
-/// Parts into which products of large blocks are divided while a factor is found, whatever the number of threads: the bytes are the same for
-/// any. With two threads the factor of 38 photographs takes 0.6 of the time of one, with eight parts 0.75.
-const PARTS: usize = 4;
-
 /// A lower triangle L with L L^H = A, as nearly as its numbers are precise.
 #[derive(Debug)]
 pub(super) enum VertexFactor {
@@ -181,7 +177,7 @@ fn symbolic_factor(lower: &SymbolicSparseColMat<usize>, order: PermRef<'_, usize
 impl<T: ComplexField> Triangle<T> {
     /// The factor of the matrix that has these entries at the places `lower` of its lower triangle.
     fn new(lower: &SymbolicSparseColMat<usize>, entries: Vec<T>, symbolic: SymbolicCholesky<usize>) -> Option<Self> {
-        let (side, par) = (faer::Side::Lower, faer::Par::rayon(PARTS));
+        let (side, par) = (faer::Side::Lower, faer::Par::Seq);
         let mut values = Vec::new();
         values.try_reserve_exact(symbolic.len_val()).ok()?;
         values.resize(symbolic.len_val(), faer::traits::math_utils::zero());

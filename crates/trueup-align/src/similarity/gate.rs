@@ -101,9 +101,11 @@ pub(super) fn allowed_divergence(photographs: usize, significance: Option<f64>, 
 }
 
 /// How far the lines must stand out to confirm directions by which very few photographs would be rolled so: as many standard deviations more as make up for
-/// how rarely photographers roll by it, up to what stands out by itself.
-fn needed_significance(photographs: usize, rolls: Option<f64>) -> f64 {
-    let rolls = rolls.filter(|_| photographs <= VERY_FEW_PHOTOGRAPHS).unwrap_or(0.0);
+/// how rarely photographers roll by it, up to what stands out by itself. So must those of few that do not `agree_as_very_few_must`.
+fn needed_significance(photographs: usize, agree_as_very_few_must: bool, rolls: Option<f64>) -> f64 {
+    let could_be_chance =
+        photographs <= VERY_FEW_PHOTOGRAPHS || photographs <= FEW_PHOTOGRAPHS && !agree_as_very_few_must;
+    let rolls = rolls.filter(|_| could_be_chance).unwrap_or(0.0);
     let unexpected = 0.5 * (rolls.to_degrees() / EXPECTED_ROLL_DEG).powi(2);
     (CONFIRMING_SIGNIFICANCE + unexpected / SIGNIFICANCE_LOG_ODDS).min(GUIDING_SIGNIFICANCE)
 }
@@ -151,7 +153,8 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
             "{inliers} of {photographs} photographs agree on the dominant directions ({needed} needed)"
         ));
     }
-    let needed = needed_significance(photographs, rolls);
+    let agree_as_very_few_must = divergence <= options.max_divergence_few;
+    let needed = needed_significance(photographs, agree_as_very_few_must, rolls);
     if let Some(significance) = significance.filter(|&significance| significance < needed) {
         let (significance, needed) = told_apart(significance, needed, 1);
         return Some(format!(
@@ -228,6 +231,9 @@ mod tests {
         assert!(refused(0.001, 5.9, 5.0, 2) && !refused(0.001, 6.1, 5.0, 2));
         assert!(refused(0.001, 6.9, 20.0, 3) && !refused(0.001, 7.0, 20.0, 3));
         assert!(!refused(0.001, 5.1, 20.0, 4), "four contradict each other where they are rolled");
+        // 5 + (6 / 2.5)^2 / 2 / 2 = 6.44 of five that agree less closely than two must; seven are many.
+        assert!(refused(0.062, 6.4, 6.0, 5) && !refused(0.062, 6.5, 6.0, 5));
+        assert!(!refused(0.019, 5.1, 6.0, 5) && !refused(0.062, 5.1, 6.0, 7));
         assert!(refused(0.021, 5.9, 1.0, 2));
         assert!(refused(0.0446, 6.6, 1.0, 2) && !refused(0.0444, 6.6, 1.0, 2));
         assert!(refused(0.11, 12.0, 1.0, 2), "no more than with many photographs");
