@@ -30,8 +30,8 @@ impl CoarseBlend<'_> {
     /// the photograph itself say that a bright sky beyond the border is as dark as the building before it, and the sky becomes
     /// gray; those of a difference say that it goes on as it is.
     pub(super) fn blend(&self) -> Result<PyramidPlane<[f32; 4]>> {
-        let cut = self.cut()?;
-        let change = self.blended_differences(&cut)?;
+        let (cut, masks) = self.cut()?;
+        let change = self.blended_differences(&cut, &masks)?;
         let mut blended = cut;
         for (blended, change) in blended.texels.iter_mut().zip(&change.texels) {
             let [r, g, b, _] = *change;
@@ -47,25 +47,33 @@ impl CoarseBlend<'_> {
         PyramidPlane::new(0..width, 0..height)
     }
 
-    /// The first level cut along the seams.
-    fn cut(&self) -> Result<PyramidPlane<[f32; 4]>> {
+    /// The first level cut along the seams, and every placement's mask.
+    fn cut(&self) -> Result<(PyramidPlane<[f32; 4]>, Vec<CountedMask>)> {
         let mut cut = self.zeros(0);
+        let mut masks = Vec::with_capacity(self.own.len());
         let masked = |placement: usize| {
             let level = self.own.read(placement)?;
             let mask = self.mask(&level, placement);
             Ok((level, mask))
         };
-        in_order(self.own.len(), masked, |(level, mask)| add_base(&mut cut, &level.plane, &mask))?;
+        in_order(self.own.len(), masked, |(level, mask): (_, CountedMask)| {
+            add_base(&mut cut, &level.plane, &mask.over(&level.plane));
+            masks.push(mask);
+        })?;
         collapse(&mut cut, None);
-        Ok(cut)
+        Ok((cut, masks))
     }
 
     /// How the photographs differ from the level that is `cut`, blended.
-    fn blended_differences(&self, cut: &PyramidPlane<[f32; 4]>) -> Result<PyramidPlane<[f32; 4]>> {
+    fn blended_differences(
+        &self,
+        cut: &PyramidPlane<[f32; 4]>,
+        masks: &[CountedMask],
+    ) -> Result<PyramidPlane<[f32; 4]>> {
         let mut sums: Vec<PyramidPlane<[f32; 4]>> = (0..=self.levels.above).map(|level| self.zeros(level)).collect();
         let differences = |placement: usize| {
             let mut level = self.own.read(placement)?.into_owned();
-            let mask = self.mask(&level, placement);
+            let mask = masks[placement].over(&level.plane);
             subtract(&mut level.plane, cut);
             Ok(pyramid(level, mask, self.levels.above))
         };
@@ -90,37 +98,50 @@ impl CoarseBlend<'_> {
         Ok(blended.unwrap_or_default())
     }
 
-    /// The share of every sample's surroundings that shows the photograph of a placement.
-    fn mask(&self, level: &CoarseLevel, placement: usize) -> PyramidPlane<f32> {
+    /// How much of every sample's surroundings shows the photograph of a placement.
+    fn mask(&self, level: &CoarseLevel, placement: usize) -> CountedMask {
         let label = self.shown.label(placement as Label);
-        let mut mask: PyramidPlane<f32> = PyramidPlane::new(level.plane.columns.clone(), level.plane.rows.clone());
+        let PyramidPlane { columns, rows, .. } = &level.plane;
+        let mut points = vec![0_u8; columns.len() * rows.len()];
+        if label == NOBODY {
+            return CountedMask { points };
+        }
         let step = (1 << self.levels.first_level) / LABELS_PER_SAMPLE;
         let down = self.shown.unrolled.canvas()[1].div_ceil(step);
-        let share = 1.0 / (LABELS_PER_SAMPLE * LABELS_PER_SAMPLE) as f32;
-        let mut labels = Vec::new();
+        let (mut labels, mut padded) = (Vec::new(), Vec::new());
         // The sample's own place is its middle: half of the points lie before it.
         let before = LABELS_PER_SAMPLE / 2;
-        for y in level.plane.rows.clone() {
-            let columns = mask.columns.clone();
-            let row = mask.row_mut(y);
+        for (y, row) in rows.clone().zip(points.chunks_exact_mut(columns.len().max(1))) {
             for v in y * LABELS_PER_SAMPLE..(y + 1) * LABELS_PER_SAMPLE {
                 let v = v.saturating_sub(before).min(down - 1);
                 let across = columns.start * LABELS_PER_SAMPLE..columns.end * LABELS_PER_SAMPLE;
                 let shifted = across.start.saturating_sub(before)..across.end;
                 let lead = shifted.start + before - across.start;
                 self.shown.labels(v, &shifted, step, &mut labels);
-                for (x, weight) in row.iter_mut().enumerate() {
-                    for point in 0..LABELS_PER_SAMPLE {
-                        let at = (x * LABELS_PER_SAMPLE + point).saturating_sub(lead);
-                        let shown = labels[at.min(labels.len() - 1)];
-                        if shown != NOBODY && shown == label {
-                            *weight += share;
-                        }
-                    }
+                let Some(first) = labels.first() else { continue };
+                padded.clear();
+                padded.resize(lead, *first);
+                padded.extend_from_slice(&labels);
+                for (points, labels) in row.iter_mut().zip(padded.as_chunks::<LABELS_PER_SAMPLE>().0) {
+                    *points += labels.iter().map(|&shown| u8::from(shown == label)).sum::<u8>();
                 }
             }
         }
-        mask
+        CountedMask { points }
+    }
+}
+
+/// Where a placement of a photograph is shown: of the points of every sample of its level how many.
+struct CountedMask {
+    points: Vec<u8>,
+}
+
+impl CountedMask {
+    /// The same as shares, for the samples of a `level`.
+    fn over(&self, level: &PyramidPlane<[f32; 4]>) -> PyramidPlane<f32> {
+        const SHARE: f32 = 1.0 / (LABELS_PER_SAMPLE * LABELS_PER_SAMPLE) as f32;
+        let texels = self.points.iter().map(|&points| f32::from(points) * SHARE).collect();
+        PyramidPlane { columns: level.columns.clone(), rows: level.rows.clone(), texels }
     }
 }
 

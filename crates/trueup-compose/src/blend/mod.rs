@@ -124,9 +124,7 @@ impl<'a> Blending<'a> {
     /// [`trueup_core::Error::Cancelled`]; what the photographs and a scratch file return.
     pub(crate) fn finish(self, parts: &[Rectangle], context: &StageContext) -> Result<PixelStore<RootPixel>> {
         let mut pixels = self.canvas();
-        // In memory, what shows nothing is empty already; in a file, nothing is before it is put there.
-        let with_empty = !pixels.is_in_memory();
-        self.finish_each(parts, with_empty, &mut |blocks| pixels.put(blocks), context)?;
+        self.finish_each(parts, &mut pixels, context)?;
         Ok(pixels)
     }
 
@@ -204,14 +202,8 @@ impl<'a> Blending<'a> {
         (0..unrolled.placed().len()).map(|at| decoded.bytes[unrolled.original(at)]).collect()
     }
 
-    /// [`Self::finish`], where `put` takes the tiles; those that show nothing only `with_empty`.
-    fn finish_each(
-        self,
-        parts: &[Rectangle],
-        with_empty: bool,
-        put: &mut (dyn FnMut(&[Block<'_, RootPixel>]) -> Result<()> + Send),
-        context: &StageContext,
-    ) -> Result<()> {
+    /// [`Self::finish`], onto what takes the tiles.
+    fn finish_each(self, parts: &[Rectangle], onto: &mut dyn TakesTiles, context: &StageContext) -> Result<()> {
         let bytes = self.placement_bytes();
         let Self { input, mut work } = self;
         let BlendInput { unrolled, corrections, photographs, resampling, plan, .. } = input;
@@ -231,6 +223,21 @@ impl<'a> Blending<'a> {
             if let Some(levels) = &mut work.levels {
                 levels.own.hold(|at| loaded.warped()[at].is_some())?;
             }
+            let place = |tile: &&BlendTile| {
+                let columns = tile.columns.start - unrolled.lead()..tile.columns.end - unrolled.lead();
+                Rectangle { columns, rows: tile.rows.clone() }
+            };
+            let showing: Vec<&BlendTile> = batch.tiles.iter().filter(|tile| !tile.shown.is_empty()).collect();
+            if let Some(places) = onto.places(&showing.iter().map(place).collect::<Vec<_>>()) {
+                let finish_in =
+                    |memory: &mut SamplingMemory, (tile, mut rows): (&&BlendTile, Vec<&mut [RootPixel]>)| {
+                        context.check_cancelled()?;
+                        tile.finish_in(&mut rows, &work, loaded.warped(), memory);
+                        Ok(())
+                    };
+                showing.par_iter().zip(places).map_init(SamplingMemory::default, finish_in).collect::<Result<()>>()?;
+                continue;
+            }
             let finish = |memory: &mut SamplingMemory, tile: &&BlendTile| {
                 context.check_cancelled()?;
                 Ok(tile.finish(&work, loaded.warped(), memory))
@@ -240,18 +247,16 @@ impl<'a> Blending<'a> {
             };
             let mut put_all = |tiles: &[&BlendTile], finished: &[Vec<RootPixel>]| {
                 let block = |(tile, pixels)| {
-                    let BlendTile { columns, rows, .. }: &&BlendTile = tile;
-                    let columns = columns.start - unrolled.lead()..columns.end - unrolled.lead();
-                    Block { columns, rows: rows.clone(), pixels }
+                    let Rectangle { columns, rows } = place(tile);
+                    Block { columns, rows, pixels }
                 };
                 let blocks: Vec<Block<'_, RootPixel>> =
                     tiles.iter().zip(finished.iter().map(Vec::as_slice)).map(block).collect();
-                put(&blocks)
+                onto.put(&blocks)
             };
             // Tiles are put on the canvas while the next ones are finished: no thread waits for the others' last tile.
             let mut last: (&[&BlendTile], Vec<Vec<RootPixel>>) = (&[], Vec::new());
-            let tiles: Vec<&BlendTile> =
-                batch.tiles.iter().filter(|tile| with_empty || !tile.shown.is_empty()).collect();
+            let tiles: Vec<&BlendTile> = batch.tiles.iter().collect();
             for tiles in tiles.chunks(TILES_AT_ONCE * rayon::current_num_threads().max(1)) {
                 let (done, finished) = rayon::join(|| put_all(last.0, &last.1), || finish_all(tiles));
                 done?;
@@ -259,6 +264,42 @@ impl<'a> Blending<'a> {
             }
             put_all(last.0, &last.1)?;
         }
+        Ok(())
+    }
+}
+
+/// What takes finished tiles.
+trait TakesTiles: Send {
+    /// Where the tiles in these places are to be finished, row by row, empty so far; `None` if they are to be [put](Self::put), those that show
+    /// nothing as well.
+    fn places(&mut self, tiles: &[Rectangle]) -> Option<Vec<Vec<&mut [RootPixel]>>>;
+
+    /// Takes finished tiles.
+    fn put(&mut self, tiles: &[Block<'_, RootPixel>]) -> Result<()>;
+}
+
+impl TakesTiles for PixelStore<RootPixel> {
+    fn places(&mut self, tiles: &[Rectangle]) -> Option<Vec<Vec<&mut [RootPixel]>>> {
+        self.tiles_mut(tiles)
+    }
+
+    fn put(&mut self, tiles: &[Block<'_, RootPixel>]) -> Result<()> {
+        Self::put(self, tiles)
+    }
+}
+
+impl TakesTiles for Vec<FinishedTile> {
+    fn places(&mut self, _: &[Rectangle]) -> Option<Vec<Vec<&mut [RootPixel]>>> {
+        None
+    }
+
+    fn put(&mut self, tiles: &[Block<'_, RootPixel>]) -> Result<()> {
+        let tile = |Block { columns, rows, pixels }: &Block<'_, RootPixel>| FinishedTile {
+            columns: columns.clone(),
+            rows: rows.clone(),
+            pixels: pixels.to_vec(),
+        };
+        self.extend(tiles.iter().map(tile));
         Ok(())
     }
 }
@@ -335,18 +376,6 @@ pub(crate) fn finish_region(
         return Err(not_asked_for());
     }
     let mut tiles = Vec::new();
-    blending.finish_each(
-        &parts,
-        true,
-        &mut |blocks| {
-            let tile = |block: &Block<'_, RootPixel>| {
-                let Block { columns, rows, pixels } = block;
-                FinishedTile { columns: columns.clone(), rows: rows.clone(), pixels: pixels.to_vec() }
-            };
-            tiles.extend(blocks.iter().map(tile));
-            Ok(())
-        },
-        context,
-    )?;
+    blending.finish_each(&parts, &mut tiles, context)?;
     Ok(FinishedRegion { tiles, shown: has_own.into_iter().collect() })
 }

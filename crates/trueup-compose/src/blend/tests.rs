@@ -204,7 +204,11 @@ fn blended(
         .enumerate()
         .filter_map(|(label, photograph)| Some((label as Label, photograph.as_ref()?)))
         .collect();
-    BlendTile { columns, rows, shown: Vec::new() }.blended(work, &shown, &mut SamplingMemory::default())
+    let mut pixels = vec![[0; 4]; columns.len() * rows.len()];
+    let mut out: Vec<&mut [RootPixel]> = pixels.chunks_exact_mut(columns.len()).collect();
+    let tile = BlendTile { columns: columns.clone(), rows, shown: Vec::new() };
+    tile.blended(&mut out, work, &shown, &mut SamplingMemory::default());
+    pixels
 }
 
 #[test]

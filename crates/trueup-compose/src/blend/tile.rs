@@ -53,19 +53,35 @@ impl BlendTile {
         photographs: &[Option<WarpedPhotograph<'_>>],
         scratch: &mut SamplingMemory,
     ) -> Vec<RootPixel> {
+        let width = self.columns.len();
+        let mut pixels = vec![[0; 4]; width * self.rows.len()];
+        let mut rows: Vec<&mut [RootPixel]> = pixels.chunks_exact_mut(width.max(1)).collect();
+        self.finish_in(&mut rows, work, photographs, scratch);
+        pixels
+    }
+
+    /// Finishes the tile in its `out`, rows of empty pixels.
+    pub(super) fn finish_in(
+        &self,
+        out: &mut [&mut [RootPixel]],
+        work: &BlendWork<'_>,
+        photographs: &[Option<WarpedPhotograph<'_>>],
+        scratch: &mut SamplingMemory,
+    ) {
         let photograph = |label: &Label| photographs.get(usize::from(*label)).and_then(Option::as_ref);
         match self.shown.as_slice() {
-            [] => vec![[0; 4]; self.columns.len() * self.rows.len()],
-            [only] => match photograph(only) {
-                Some(photograph) => self.of_one(work, photograph, usize::from(*only), scratch),
-                None => vec![[0; 4]; self.columns.len() * self.rows.len()],
-            },
+            [] => {}
+            [only] => {
+                if let Some(photograph) = photograph(only) {
+                    self.of_one(out, work, photograph, usize::from(*only), scratch);
+                }
+            }
             several => {
                 let shown: Vec<_> = several.iter().filter_map(|label| Some((*label, photograph(label)?))).collect();
                 if work.levels.is_some() {
-                    self.blended(work, &shown, scratch)
+                    self.blended(out, work, &shown, scratch);
                 } else {
-                    self.cut(work, &shown, scratch)
+                    self.cut(out, work, &shown, scratch);
                 }
             }
         }
@@ -78,24 +94,23 @@ impl BlendTile {
     /// A tile that shows one photograph: its fine levels are that photograph's, its coarse ones may not be.
     fn of_one(
         &self,
+        out: &mut [&mut [RootPixel]],
         work: &BlendWork<'_>,
         photograph: &WarpedPhotograph<'_>,
         label: usize,
         scratch: &mut SamplingMemory,
-    ) -> Vec<RootPixel> {
-        let width = self.columns.len();
+    ) {
         let offset = work
             .levels
             .as_ref()
             .and_then(|levels| self.offset(&levels.blended, levels.own.at(label), work.first_level));
         let mut finishing = FinishingRows {
             offsets: offset.as_ref().map(|offset| offset.expansion(&self.columns, self.rows.start)),
-            change: vec![[0.0; 4]; width],
-            out: vec![[0; 4]; width * self.rows.len()],
+            change: vec![[0.0; 4]; self.columns.len()],
+            out,
         };
         let window = self.window(&self.columns, &self.rows);
         photograph.sample_rows(window, &work.resampling, scratch, &mut finishing);
-        finishing.out
     }
 
     /// What the coarse levels change of a photograph, around the tile at half its size; `None` if nothing.
@@ -145,16 +160,16 @@ impl BlendTile {
     /// Every pixel from the photograph that the seams give it to.
     fn cut(
         &self,
+        out: &mut [&mut [RootPixel]],
         work: &BlendWork<'_>,
         shown: &[(Label, &WarpedPhotograph<'_>)],
         scratch: &mut SamplingMemory,
-    ) -> Vec<RootPixel> {
+    ) {
         let width = self.columns.len();
-        let mut out = vec![[0; 4]; width * self.rows.len()];
-        let mut taken = vec![0.0_f32; out.len()];
+        let mut taken = vec![0.0_f32; width * self.rows.len()];
         let mut labels = Vec::new();
         for (label, photograph) in shown {
-            let mut pixels = vec![[0.0; 4]; out.len()];
+            let mut pixels = vec![[0.0; 4]; taken.len()];
             photograph.sample(self.window(&self.columns, &self.rows), &mut pixels, &work.resampling, scratch);
             for (row, y) in self.rows.clone().enumerate() {
                 work.shown.labels(y, &self.columns, 1, &mut labels);
@@ -164,37 +179,40 @@ impl BlendTile {
                     let claim = pixels[at][3] * if *own == work.shown.label(*label) { 2.0 } else { 1.0 };
                     if claim > taken[at] {
                         taken[at] = claim;
-                        out[at] = finished(pixels[at]);
+                        out[row][x] = finished(pixels[at]);
                     }
                 }
             }
         }
-        out
     }
 
     /// The fine levels of several photographs blended, on top of the blended coarse ones.
     pub(super) fn blended(
         &self,
+        out: &mut [&mut [RootPixel]],
         work: &BlendWork<'_>,
         shown: &[(Label, &WarpedPhotograph<'_>)],
         scratch: &mut SamplingMemory,
-    ) -> Vec<RootPixel> {
+    ) {
         let (columns, rows) = Self::with_margin(&self.columns, &self.rows, work);
         let masks = self.masks(work, shown, &columns, &rows);
-        self.blended_by(Claim::OwnersAlone, &masks, work, shown, scratch)
-            .or_else(|| self.blended_by(Claim::Everyone, &masks, work, shown, scratch))
-            .unwrap_or_default()
+        for claim in [Claim::OwnersAlone, Claim::Everyone] {
+            if self.blended_by(claim, out, &masks, work, shown, scratch).is_some() {
+                break;
+            }
+        }
     }
 
-    /// [`Self::blended`] of photographs that are shown by `masks`; `None` if the claim does not do.
+    /// [`Self::blended`] of photographs that are shown by `masks`; `None`, and nothing of `out` set, if the claim does not do.
     fn blended_by(
         &self,
         claim: Claim,
+        out: &mut [&mut [RootPixel]],
         masks: &[PyramidPlane<f32>],
         work: &BlendWork<'_>,
         shown: &[(Label, &WarpedPhotograph<'_>)],
         scratch: &mut SamplingMemory,
-    ) -> Option<Vec<RootPixel>> {
+    ) -> Option<()> {
         let levels = work.levels.as_ref()?;
         let (columns, rows) = grown([&self.columns, &self.rows], tile_margin(work.first_level), work);
         let mut sums = zero_levels(&columns, &rows, work.first_level);
@@ -250,14 +268,14 @@ impl BlendTile {
         }
         let blended = blended?;
         let shift = self.columns.start - columns.start;
-        let mut out = Vec::with_capacity(opacity.len());
-        for (y, opacity) in self.rows.clone().zip(opacity.chunks_exact(self.columns.len())) {
-            for (texel, &opacity) in blended.row(y)[shift..].iter().zip(opacity) {
-                let opacity = if texel[3] > 0.0 { opacity } else { 0.0 };
-                out.push(finished([texel[0], texel[1], texel[2], opacity]));
+        let mut row = vec![[0.0; 4]; self.columns.len()];
+        for ((y, opacity), out) in self.rows.clone().zip(opacity.chunks_exact(row.len())).zip(out) {
+            for (pixel, (texel, &opacity)) in row.iter_mut().zip(blended.row(y)[shift..].iter().zip(opacity)) {
+                *pixel = [texel[0], texel[1], texel[2], if texel[3] > 0.0 { opacity } else { 0.0 }];
             }
+            finish_all(&row, out);
         }
-        Some(out)
+        Some(())
     }
 
     /// Where each photograph is shown, 0 or 1.
@@ -300,24 +318,20 @@ impl BlendTile {
 }
 
 /// Finishes rows as they come: what is near in memory is used again at once.
-struct FinishingRows<'a> {
+struct FinishingRows<'a, 'out> {
     /// What is added to each.
     offsets: Option<Expansion<'a, [f32; 4]>>,
     change: Vec<[f32; 4]>,
-    out: Vec<RootPixel>,
+    out: &'a mut [&'out mut [RootPixel]],
 }
 
-impl RowSink for FinishingRows<'_> {
+impl RowSink for FinishingRows<'_, '_> {
     fn row(&mut self, number: usize, row: &mut [[f32; 4]]) {
         if let Some(offsets) = &mut self.offsets {
             offsets.next_row(&mut self.change);
-            for (pixel, &change) in row.iter_mut().zip(&self.change) {
-                let [r, g, b] = color(change).unwrap_or_default();
-                // The share is the offset's own.
-                *pixel = [pixel[0] + r, pixel[1] + g, pixel[2] + b, pixel[3]];
-            }
+            with_vector_instructions(Changing { pixels: row, changes: &self.change });
         }
-        finish_all(row, &mut self.out[number * row.len()..][..row.len()]);
+        finish_all(row, self.out[number]);
     }
 }
 
@@ -413,15 +427,38 @@ struct Finishing<'a> {
 impl VectorLoop for Finishing<'_> {
     #[inline(always)]
     fn run(self) {
-        for (out, pixel) in self.out.iter_mut().zip(self.pixels) {
-            *out = finished(*pixel);
+        for (out, &value) in self.out.as_flattened_mut().iter_mut().zip(self.pixels.as_flattened()) {
+            *out = finished_sample(value);
+        }
+    }
+}
+
+/// A row of pixels, and what is added to their colors.
+struct Changing<'a> {
+    pixels: &'a mut [[f32; 4]],
+    changes: &'a [[f32; 4]],
+}
+
+impl VectorLoop for Changing<'_> {
+    #[inline(always)]
+    fn run(self) {
+        for (pixel, &change) in self.pixels.iter_mut().zip(self.changes) {
+            let [r, g, b] = color(change).unwrap_or_default();
+            // The share is the offset's own.
+            *pixel = [pixel[0] + r, pixel[1] + g, pixel[2] + b, pixel[3]];
         }
     }
 }
 
 /// A pixel of the panorama from the square root of linear light and the share covered.
-#[inline(always)]
 fn finished(pixel: [f32; 4]) -> RootPixel {
-    // The casts saturate; NaN becomes 0.
-    pixel.map(|value| (value * 65535.0 + 0.5) as u16)
+    pixel.map(finished_sample)
+}
+
+/// 65535 for 1, and for all above; 0 for what is below it, and for no number.
+#[allow(clippy::manual_clamp)]
+#[inline(always)]
+fn finished_sample(value: f32) -> u16 {
+    // `max` first: unlike `clamp`, it turns NaN into a number. By 32 bits, since vector instructions have no shorter conversion.
+    (value * 65535.0 + 0.5).max(0.0).min(65535.0) as i32 as u16
 }

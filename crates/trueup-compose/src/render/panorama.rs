@@ -123,10 +123,15 @@ impl RowSource for Panorama {
             PanoramaPixels::Roots(roots) => {
                 let encode = &self.encoding.roots;
                 for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?[columns].iter()) {
-                    let opacity = ((u32::from(opacity) * 255 + 32767) / 65535) as u8;
-                    let shown = opacity > 0;
-                    let level = |root: u16| if shown { encode.level(root) } else { 0 };
-                    pixel.copy_from_slice(&[level(r), level(g), level(b), opacity]);
+                    let opacity = match opacity {
+                        u16::MAX => u8::MAX,
+                        _ => ((u32::from(opacity) * 255 + 32767) / 65535) as u8,
+                    };
+                    let levels = match opacity {
+                        0 => [0; 4],
+                        _ => [encode.level(r), encode.level(g), encode.level(b), opacity],
+                    };
+                    pixel.copy_from_slice(&levels);
                 }
             }
         }

@@ -53,6 +53,9 @@ fn reduced_channels<T: Sample, const C: usize>(raster: &Raster<T>, factor: f64) 
     reduced
 }
 
+/// Values of a column of sums that are read together, one at least for each channel.
+const LANES: usize = 4;
+
 /// One reduced row: rows are summed first, as they lie in memory, then columns.
 struct OneRow<'a, T, const C: usize> {
     raster: &'a Raster<T>,
@@ -70,31 +73,35 @@ impl<T: Sample, const C: usize> VectorLoop for OneRow<'_, T, C> {
         let Self { raster, across, down, sums, row, .. } = self;
         let clamped = |at: i64, size: usize| at.clamp(0, size as i64 - 1) as usize;
         sums.clear();
-        sums.resize(raster.width() * C, 0.0);
+        // Columns are read four values at a time, as many as vector instructions take, whatever follows the last channel.
+        sums.resize(raster.width() * C + LANES - C, 0.0);
         for (tap, &weight) in down.weights.iter().enumerate() {
             let samples = raster.row(clamped(down.first + tap as i64, raster.height()));
             for (sum, sample) in sums.iter_mut().zip(samples) {
                 *sum += weight * sample.level();
             }
         }
-        let columns = sums.as_chunks::<C>().0;
         for (out, taps) in row.as_chunks_mut::<C>().0.iter_mut().zip(across) {
-            let mut mean = [0.0_f32; C];
-            let mut add = |column: &[f32; C], weight: f32| {
-                for (mean, value) in mean.iter_mut().zip(column) {
-                    *mean += weight * value;
-                }
-            };
+            let mut mean = [0.0_f32; LANES];
             let last = taps.first + taps.weights.len() as i64;
-            if taps.first >= 0 && last <= columns.len() as i64 {
-                let within = &columns[taps.first as usize..last as usize];
-                within.iter().zip(&taps.weights).for_each(|(column, &weight)| add(column, weight));
+            if taps.first >= 0 && last <= raster.width() as i64 {
+                let within = &sums[taps.first as usize * C..(last as usize - 1) * C + LANES];
+                for (column, &weight) in within.windows(LANES).step_by(C).zip(&taps.weights) {
+                    for lane in 0..LANES {
+                        mean[lane] += weight * column[lane];
+                    }
+                }
             } else {
                 for (tap, &weight) in taps.weights.iter().enumerate() {
-                    add(&columns[clamped(taps.first + tap as i64, columns.len())], weight);
+                    let column = &sums[clamped(taps.first + tap as i64, raster.width()) * C..][..LANES];
+                    for lane in 0..LANES {
+                        mean[lane] += weight * column[lane];
+                    }
                 }
             }
-            *out = mean.map(T::of_level);
+            for (out, &mean) in out.iter_mut().zip(&mean) {
+                *out = T::of_level(mean);
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Interpolation of photographs at real positions, in their own encoding, on the scale of 0 to 255.
 
 mod fitted;
+mod narrow;
 mod reduce;
 
 pub(crate) use fitted::reduce_by;
@@ -12,6 +13,7 @@ use trueup_core::raster::{Photograph, Raster};
 
 use crate::kernel::{Bilinear, InterpolationKernel};
 use crate::simd::{Positions, Rgb8, VectorLoop, cubic_rgb8, cubic_window, linear_rgb8, with_vector_instructions};
+use narrow::{BLOCK, NarrowTaps, average_narrow, is_narrow};
 
 /// Taps of a widened kernel per axis, at most: a kernel of radius 2 widened 15 times has 60.
 const MAX_TAPS: usize = 64;
@@ -129,9 +131,26 @@ struct Averages<'a, K, T, const C: usize> {
 impl<K: InterpolationKernel, T: Sample, const C: usize> VectorLoop for Averages<'_, K, T, C> {
     #[inline(always)]
     fn run(self) {
+        let Self { raster, positions, stretch, out, .. } = self;
         let mut workspace = Workspace { wx: [0.0; MAX_TAPS], wy: [0.0; MAX_TAPS], columns: [0.0; 3 * MAX_TAPS] };
-        for (index, out) in self.out.iter_mut().enumerate().take(self.positions.len()) {
-            *out = average_one::<K, T, C>(self.raster, self.positions, index, self.stretch, &mut workspace);
+        let count = positions.len().min(out.len());
+        if C != 3 || !(is_narrow::<K>(stretch[0]) && is_narrow::<K>(stretch[1])) {
+            for (index, out) in out[..count].iter_mut().enumerate() {
+                *out = average_one::<K, T, C>(raster, positions, index, stretch, &mut workspace);
+            }
+            return;
+        }
+        for start in (0..count).step_by(BLOCK) {
+            let block = start..(start + BLOCK).min(count);
+            let (columns, rows) = (&positions.column[block.clone()], &positions.row[block.clone()]);
+            let across = NarrowTaps::of::<K>(columns, &positions.fraction_x[block.clone()], stretch[0]);
+            let down = NarrowTaps::of::<K>(rows, &positions.fraction_y[block.clone()], stretch[1]);
+            for (at, index) in block.enumerate() {
+                out[index] = match average_narrow(raster, &across, &down, at) {
+                    Some(mean) => mean,
+                    None => average_one::<K, T, C>(raster, positions, index, stretch, &mut workspace),
+                };
+            }
         }
     }
 }

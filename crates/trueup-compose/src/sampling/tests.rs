@@ -156,3 +156,20 @@ fn a_single_pixel_is_a_photograph() {
         assert_eq!(sampled, [7.0, 8.0, 9.0, 255.0]);
     }
 }
+
+/// Narrow kernels are read in eights: what comes of it is what comes of one sample after the other, up to the border.
+#[test]
+fn narrow_means_are_those_of_single_samples() {
+    let raster = noise(23, 17, 3);
+    let points = scattered_points();
+    for stretch in [[1.0, 1.3], [1.7, 1.1], [1.99, 1.99], [2.0, 1.2], [3.1, 1.0]] {
+        let found = sample::<Bicubic>(&Photograph::Eight(raster.clone()), stretch, &points);
+        let (wx, wy, columns) = ([0.0; MAX_TAPS], [0.0; MAX_TAPS], [0.0; 3 * MAX_TAPS]);
+        let mut workspace = Workspace { wx, wy, columns };
+        let positions = positions(&points);
+        for (index, found) in found.iter().enumerate() {
+            let one = average_one::<Bicubic, u8, 3>(&raster, &positions, index, stretch, &mut workspace);
+            assert_eq!(found.map(f32::to_bits), one.map(f32::to_bits), "{stretch:?} at {:?}", points[index]);
+        }
+    }
+}

@@ -1,6 +1,5 @@
 //! Where a photograph shows less detail than another one that shows the same.
 
-use std::collections::VecDeque;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -100,23 +99,35 @@ impl Detail {
         let (columns, rows) = (view.columns.len().div_ceil(CELL_PX), view.rows.len().div_ceil(CELL_PX));
         let mut sums = vec![Sums::default(); columns * rows];
         let (width, height) = (view.columns.len(), view.rows.len());
-        // Brightness in three rows, in 256ths of a level; below 0 where it tells nothing.
-        let brightness = |y: usize| -> Vec<i32> {
-            let row = &view.pixels[y * width..(y + 1) * width];
-            row.iter().map(|pixel| if tells(pixel) { luma(pixel) as i32 } else { -1 }).collect()
-        };
-        let mut window: VecDeque<Vec<i32>> = (0..height.min(2)).map(brightness).collect();
-        for y in 1..height.saturating_sub(1) {
-            window.push_back(brightness(y + 1));
+        // Brightness in 256ths of a level; below 0 where it tells nothing.
+        let brightness = |y: usize, row: &mut Vec<i32>| {
+            row.clear();
             let pixels = &view.pixels[y * width..(y + 1) * width];
-            for x in 1..width.saturating_sub(1) {
-                let around = [window[1][x - 1], window[1][x + 1], window[0][x], window[2][x]];
-                let own = window[1][x];
-                if around.into_iter().fold(own, i32::min) >= 0 {
-                    sums[y / CELL_PX * columns + x / CELL_PX].add(&pixels[x], laplacian(own, around));
+            row.extend(pixels.iter().map(|pixel| if tells(pixel) { luma(pixel) as i32 } else { -1 }));
+        };
+        let mut window: [Vec<i32>; 3] = Default::default();
+        (0..height.min(2)).for_each(|y| brightness(y, &mut window[y + 1]));
+        for y in 1..height.saturating_sub(1) {
+            window.rotate_left(1);
+            brightness(y + 1, &mut window[2]);
+            let [above, own, below] = &window;
+            let pixels = &view.pixels[y * width..(y + 1) * width];
+            for (cell, sums) in sums[y / CELL_PX * columns..][..columns].iter_mut().enumerate() {
+                let across = (cell * CELL_PX).max(1)..((cell + 1) * CELL_PX).min(width - 1);
+                if across.is_empty() {
+                    continue;
                 }
+                let mut sum = Sums::default();
+                let beside = own[across.start - 1..across.end + 1].windows(3);
+                let over = above[across.clone()].iter().zip(&below[across.clone()]);
+                for ((beside, (&above, &below)), pixel) in beside.zip(over).zip(&pixels[across]) {
+                    let (own, around) = (beside[1], [beside[0], beside[2], above, below]);
+                    if around.into_iter().fold(own, i32::min) >= 0 {
+                        sum.add(pixel, laplacian(own, around));
+                    }
+                }
+                sums.join(&sum);
             }
-            window.pop_front();
         }
         let cell = |index: usize| {
             let near = |at: usize, length: usize| at.saturating_sub(1)..(at + 2).min(length);

@@ -75,31 +75,24 @@ impl SmallView {
     pub(crate) fn halved(&self) -> Self {
         let half = |range: &Range<usize>| range.start / 2..range.end.div_ceil(2);
         let (columns, rows) = (half(&self.columns), half(&self.rows));
+        let outside = vec![[0; 4]; self.columns.len()];
+        let row = |y: usize| match self.rows.contains(&y) {
+            true => &self.pixels[(y - self.rows.start) * self.columns.len()..][..self.columns.len()],
+            false => &outside,
+        };
+        // An odd first column shares its pixel with what is outside, and so does a last one without a right neighbor.
+        let alone = usize::from(!self.columns.is_empty()) * (self.columns.start % 2);
         let mut pixels = Vec::with_capacity(columns.len() * rows.len());
         for y in rows.clone() {
-            for x in columns.clone() {
-                pixels.push(self.mean_of_four(2 * x, 2 * y));
-            }
+            let (first_upper, upper) = row(2 * y).split_at(alone);
+            let (first_lower, lower) = row(2 * y + 1).split_at(alone);
+            let ((upper, last_upper), (lower, last_lower)) = (upper.as_chunks::<2>(), lower.as_chunks::<2>());
+            let lone = |(&upper, &lower): (&SmallPixel, &SmallPixel)| mean_of_four([upper, [0; 4], lower, [0; 4]]);
+            pixels.extend(first_upper.iter().zip(first_lower).map(lone));
+            pixels.extend(upper.iter().zip(lower).map(|(&[a, b], &[c, d])| mean_of_four([a, b, c, d])));
+            pixels.extend(last_upper.iter().zip(last_lower).map(lone));
         }
         Self { columns, rows, pixels }
-    }
-
-    fn mean_of_four(&self, x: usize, y: usize) -> SmallPixel {
-        let (mut sum, mut count, mut any, mut all) = ([0_u16; 3], 0, 0, u8::MAX);
-        for (x, y) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
-            let pixel = self.index(x, y).map_or([0; 4], |index| self.pixels[index]);
-            if pixel[3] & PARTLY != 0 {
-                for (sum, level) in sum.iter_mut().zip(pixel) {
-                    *sum += u16::from(level);
-                }
-                count += 1;
-            }
-            any |= pixel[3];
-            all &= pixel[3];
-        }
-        let mean = |sum: u16| ((sum + count / 2) / count.max(1)) as u8;
-        let [r, g, b] = sum.map(mean);
-        [r, g, b, any & !WHOLLY | all & WHOLLY]
     }
 
     /// Distance of every pixel to the border of what is covered wholly.
@@ -109,6 +102,28 @@ impl SmallView {
         let largest = distances.iter().copied().max().unwrap_or(0).max(1);
         Depths { distances, largest }
     }
+}
+
+/// The mean of those of four pixels that are covered.
+#[inline]
+fn mean_of_four(four: [SmallPixel; 4]) -> SmallPixel {
+    let any = four.iter().fold(0, |any, pixel| any | pixel[3]);
+    let all = four.iter().fold(u8::MAX, |all, pixel| all & pixel[3]);
+    let flags = any & !WHOLLY | all & WHOLLY;
+    if any & PARTLY == 0 {
+        return [0, 0, 0, flags];
+    }
+    let sum = |channel: usize| -> u16 {
+        let level = |pixel: &SmallPixel| if pixel[3] & PARTLY != 0 { u16::from(pixel[channel]) } else { 0 };
+        four.iter().map(level).sum()
+    };
+    // Most have all four; their mean takes no division.
+    let count = if all & PARTLY != 0 { 4 } else { four.iter().filter(|pixel| pixel[3] & PARTLY != 0).count() as u16 };
+    let mean = |channel: usize| match count {
+        4 => ((sum(channel) + 2) / 4) as u8,
+        _ => ((sum(channel) + count / 2) / count) as u8,
+    };
+    [mean(0), mean(1), mean(2), flags]
 }
 
 /// How deep the pixels of a view lie inside its photograph.

@@ -56,11 +56,6 @@ impl<P: Pixel> PixelStore<P> {
         Self::of_pixels(width, vec![P::default(); width * height])
     }
 
-    /// Whether it is in memory.
-    pub(crate) fn is_in_memory(&self) -> bool {
-        matches!(self, Self::Memory { .. })
-    }
-
     /// Row-major pixels.
     pub(crate) fn of_pixels(width: usize, pixels: Vec<P>) -> Self {
         Self::Memory { width, pixels }
@@ -82,6 +77,32 @@ impl<P: Pixel> PixelStore<P> {
             }
             Self::Scratch(own) => blocks.par_iter().try_for_each(|block| own.put(block)),
         }
+    }
+
+    /// The rows of tiles of the canvas, so that all of them can be set at the same time; `None` if it is not in memory. Tiles do not
+    /// overlap, and those that have a row in common have all their rows in common.
+    pub(crate) fn tiles_mut(&mut self, tiles: &[Rectangle]) -> Option<Vec<Vec<&mut [P]>>> {
+        let Self::Memory { width, pixels } = self else { return None };
+        let mut in_order: Vec<usize> = (0..tiles.len()).collect();
+        in_order.sort_unstable_by_key(|&tile| (tiles[tile].rows.start, tiles[tile].columns.start));
+        let mut all: Vec<Vec<&mut [P]>> = tiles.iter().map(|tile| Vec::with_capacity(tile.rows.len())).collect();
+        let mut canvas = pixels.chunks_exact_mut((*width).max(1));
+        let mut next = 0;
+        for strip in in_order.chunk_by(|&one, &other| tiles[one].rows == tiles[other].rows) {
+            let rows = &tiles[strip[0]].rows;
+            for row in canvas.by_ref().skip(rows.start.checked_sub(next)?).take(rows.len()) {
+                let (mut rest, mut first) = (row, 0);
+                for &tile in strip {
+                    let columns = &tiles[tile].columns;
+                    let (_, own) = rest.split_at_mut_checked(columns.start.checked_sub(first)?)?;
+                    let (own, right) = own.split_at_mut_checked(columns.len())?;
+                    all[tile].push(own);
+                    (rest, first) = (right, columns.end);
+                }
+            }
+            next = rows.end;
+        }
+        Some(all)
     }
 
     /// The block `columns` x `rows`, row by row.
@@ -169,6 +190,25 @@ mod tests {
                 assert_eq!(store.pixel(last[0], last[1]).expect("written"), pixel(last[0], last[1]));
             }
         }
+    }
+
+    #[test]
+    fn tiles_are_set_in_their_places() {
+        let mut store = PixelStore::in_memory([7, 5]);
+        let tile = |columns, rows| Rectangle { columns, rows };
+        let tiles = [tile(3..5, 3..5), tile(4..7, 0..2), tile(0..3, 0..2)];
+        let mut rows = store.tiles_mut(&tiles).expect("in memory");
+        for (tile, rows) in (1..).zip(&mut rows) {
+            rows.iter_mut().for_each(|row| row.fill([tile; 4]));
+        }
+        for (y, expected) in ["333 222", "333 222", "       ", "   11  ", "   11  "].into_iter().enumerate() {
+            let row = store.row(y).expect("in memory");
+            let found: String =
+                row.iter().map(|pixel: &RootPixel| [' ', '1', '2', '3'][usize::from(pixel[0])]).collect();
+            assert_eq!(found, expected, "row {y}");
+        }
+        assert!(store.tiles_mut(&[tile(0..4, 0..2), tile(3..5, 0..2)]).is_none());
+        assert!(store.tiles_mut(&[tile(0..4, 0..2), tile(5..7, 1..3)]).is_none());
     }
 
     #[test]
