@@ -3,6 +3,8 @@
 use rayon::prelude::*;
 use trueup_core::raster::Raster;
 
+use super::rectangle::PointMass;
+
 /// Reduction of the picture before its gradient is taken, which removes aliasing and the staircase of pixels (IPOL,
 /// section 2.1).
 const REDUCTION: f64 = 0.8;
@@ -106,10 +108,11 @@ impl GradientField {
         &self.magnitudes
     }
 
-    /// Column and row of an element of the padded arrays.
-    pub(super) fn position(&self, index: u32) -> (f64, f64) {
+    /// An element of the padded arrays, its magnitude for mass.
+    pub(super) fn pixel(&self, index: u32) -> PointMass {
         let stride = self.stride() as u32;
-        (f64::from(index % stride), f64::from(index / stride))
+        let mass = f64::from(self.magnitudes[index as usize]);
+        PointMass { x: f64::from(index % stride), y: f64::from(index / stride), mass }
     }
 
     /// The elements that have a level line, those of the largest magnitude first, in [`MAGNITUDE_CLASSES`] classes; row by
@@ -195,18 +198,21 @@ impl AxisFilter {
         let outputs = (length as f64 * scale).floor() as usize;
         let mut starts = Vec::with_capacity(outputs);
         let mut weights = vec![0.0_f32; outputs * taps];
+        let mut sampled = Vec::new();
         for (output, weights) in weights.chunks_exact_mut(taps.max(1)).enumerate() {
             let center = (output as f64 + 0.5) / scale;
             let first = center.floor() as isize - reach;
             let start = first.clamp(0, (length - taps) as isize);
             let inputs = first..first + 2 * reach + 2;
             let weight_of = |input: isize| (-0.5 * ((input as f64 + 0.5 - center) / sigma).powi(2)).exp();
-            let total: f64 = inputs.clone().map(weight_of).sum();
-            for input in inputs {
+            sampled.clear();
+            sampled.extend(inputs.clone().map(weight_of));
+            let total: f64 = sampled.iter().sum();
+            for (input, sampled) in inputs.zip(&sampled) {
                 let inside = mirror(input, length as isize) - start;
                 // Short axes fold more than once; what falls outside the window then is negligible or nothing.
                 if let Some(weight) = weights.get_mut(inside.max(0) as usize) {
-                    *weight += (weight_of(input) / total) as f32;
+                    *weight += (sampled / total) as f32;
                 }
             }
             starts.push(start as usize);

@@ -151,9 +151,9 @@ fn check(picture: &Raster<f32>, options: &LineOptions) -> Result<()> {
 
 /// Regions, rectangles and their significance, in the order of the seeds.
 fn segments_of_field(field: &GradientField, min_significance: f64, context: &StageContext) -> Result<Vec<LineSegment>> {
-    let false_alarms = FalseAlarms::new(field.width(), field.height());
     let mut grower = RegionGrower::new(field);
-    let min_region = false_alarms.smallest_region(grower.aligned_probability(), min_significance);
+    let false_alarms = FalseAlarms::new(field.width(), field.height(), grower.aligned_probability());
+    let min_region = false_alarms.smallest_region(min_significance);
     let mut segments = Vec::new();
     for (count, &seed) in field.seeds().iter().enumerate() {
         if count % SEEDS_PER_CHECK == 0 {

@@ -6,6 +6,9 @@ use super::significance::FalseAlarms;
 /// Changes tried in each step of the improvement (IPOL, section 2.8).
 const TRIES: usize = 5;
 
+/// How often the precision may be halved, in the first step of the improvement and in the last.
+pub(super) const MOST_HALVINGS: usize = 2 * TRIES;
+
 /// What a try takes off the width, in reduced pixels (IPOL, section 2.8).
 const WIDTH_STEP_PX: f64 = 0.5;
 
@@ -18,6 +21,21 @@ const MIN_WIDTH_PX: f64 = 1.0;
 /// Pixel centers this close outside a rectangle count as inside: those that define its sides must.
 const BOUNDARY_SLACK_PX: f64 = 1e-6;
 
+/// A pixel of a region, in the padded field's coordinates, with its gradient magnitude for mass.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PointMass {
+    pub x: f64,
+    pub y: f64,
+    pub mass: f64,
+}
+
+impl PointMass {
+    pub(super) fn squared_distance(&self, other: &Self) -> f64 {
+        let (dx, dy) = (self.x - other.x, self.y - other.y);
+        dx * dx + dy * dy
+    }
+}
+
 /// A rectangle in the padded field's coordinates: a center, a direction, and intervals along and across it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LineSupportRectangle {
@@ -28,36 +46,30 @@ pub(super) struct LineSupportRectangle {
     along: [f64; 2],
     /// Interval along (-direction.y, direction.x), from the center.
     across: [f64; 2],
-    /// Probability that a pixel of noise is aligned: twice the tolerance over 2 pi.
-    probability: f64,
+    /// How often the precision of the field's level lines was halved.
+    halvings: usize,
 }
 
 impl LineSupportRectangle {
-    /// The rectangle of the region `indices`: through its center of mass along the principal axis of its inertia, with
-    /// gradient magnitudes for masses, and as large as to hold all the pixels' centers.
+    /// The rectangle of a region: through its center of mass along the principal axis of its inertia, with gradient
+    /// magnitudes for masses, and as large as to hold all the pixels' centers.
     ///
     /// `towards` is any vector within a quarter turn of the wanted direction. `None` if the region has no mass.
     ///
     /// # Source
     /// IPOL, section 2.5.
-    pub(super) fn around(indices: &[u32], field: &GradientField, towards: [f64; 2], probability: f64) -> Option<Self> {
-        let magnitudes = field.magnitudes();
-        let weighted = || {
-            indices.iter().map(|&index| {
-                let (x, y) = field.position(index);
-                (x, y, f64::from(magnitudes[index as usize]))
-            })
-        };
-        let (mass, sum_x, sum_y) = weighted().fold((0.0, 0.0, 0.0), |(mass, sum_x, sum_y), (x, y, weight)| {
-            (mass + weight, sum_x + weight * x, sum_y + weight * y)
-        });
+    pub(super) fn around(pixels: &[PointMass], towards: [f64; 2]) -> Option<Self> {
+        let (mass, sum_x, sum_y) =
+            pixels.iter().fold((0.0, 0.0, 0.0), |(sum, sum_x, sum_y), &PointMass { x, y, mass }| {
+                (sum + mass, sum_x + mass * x, sum_y + mass * y)
+            });
         if mass <= 0.0 {
             return None;
         }
         let center = [sum_x / mass, sum_y / mass];
-        let (xx, xy, yy) = weighted().fold((0.0, 0.0, 0.0), |(xx, xy, yy), (x, y, weight)| {
+        let (xx, xy, yy) = pixels.iter().fold((0.0, 0.0, 0.0), |(xx, xy, yy), &PointMass { x, y, mass }| {
             let (dx, dy) = (x - center[0], y - center[1]);
-            (xx + weight * dx * dx, xy + weight * dx * dy, yy + weight * dy * dy)
+            (xx + mass * dx * dx, xy + mass * dx * dy, yy + mass * dy * dy)
         });
         let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
         let mut direction = [angle.cos(), angle.sin()];
@@ -65,15 +77,15 @@ impl LineSupportRectangle {
             direction = direction.map(|component| -component);
         }
         let (mut along, mut across) = ([0.0_f64; 2], [0.0_f64; 2]);
-        for (x, y, _) in weighted() {
+        for &PointMass { x, y, .. } in pixels {
             let (dx, dy) = (x - center[0], y - center[1]);
             let (a, b) = (dx * direction[0] + dy * direction[1], dy * direction[0] - dx * direction[1]);
-            along = [along[0].min(a), along[1].max(a)];
-            across = [across[0].min(b), across[1].max(b)];
+            along = [lesser(along[0], a), greater(along[1], a)];
+            across = [lesser(across[0], b), greater(across[1], b)];
         }
         let missing = 0.5 * (MIN_WIDTH_PX - (across[1] - across[0])).max(0.0);
         across = [across[0] - missing, across[1] + missing];
-        Some(Self { center, direction, along, across, probability })
+        Some(Self { center, direction, along, across, halvings: 0 })
     }
 
     /// Width, in reduced pixels.
@@ -102,13 +114,12 @@ impl LineSupportRectangle {
     }
 
     /// Pixels whose center is inside, and how many of them are aligned with the direction.
-    fn count(&self, field: &GradientField) -> (usize, usize) {
+    fn count(&self, field: &GradientField, tangent: f32) -> (usize, usize) {
         let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(a, b)| self.point(self.along[a], self.across[b])[1]);
         let top = corners.iter().copied().fold(f64::INFINITY, f64::min) - BOUNDARY_SLACK_PX;
         let bottom = corners.iter().copied().fold(f64::NEG_INFINITY, f64::max) + BOUNDARY_SLACK_PX;
         let first_row = top.ceil().max(1.0) as usize;
         let last_row = bottom.floor().min(field.height() as f64).max(0.0) as usize;
-        let tangent = (std::f64::consts::PI * self.probability).tan() as f32;
         let direction = self.direction.map(|component| component as f32);
         let (mut total, mut aligned) = (0, 0);
         for row in first_row..=last_row {
@@ -151,12 +162,13 @@ impl LineSupportRectangle {
     }
 
     fn significance(&self, field: &GradientField, false_alarms: &FalseAlarms) -> f64 {
-        let (total, aligned) = self.count(field);
-        false_alarms.significance(total, aligned, self.probability)
+        let precision = false_alarms.precision(self.halvings);
+        let (total, aligned) = self.count(field, precision.tangent);
+        false_alarms.significance(total, aligned, precision)
     }
 
     fn finer(mut self) -> Option<Self> {
-        self.probability *= 0.5;
+        self.halvings += 1;
         Some(self)
     }
 
@@ -173,6 +185,16 @@ pub(super) fn is_aligned(line: [f32; 2], direction: [f32; 2], tangent: f32) -> b
     let dot = line[0] * direction[0] + line[1] * direction[1];
     let cross = line[0] * direction[1] - line[1] * direction[0];
     dot > 0.0 && cross.abs() <= tangent * dot
+}
+
+/// The lesser of two numbers, of which neither is NaN: one instruction.
+fn lesser(a: f64, b: f64) -> f64 {
+    if b < a { b } else { a }
+}
+
+/// The greater of two numbers, of which neither is NaN: one instruction.
+fn greater(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
 }
 
 /// Looks for a more significant variant of a rectangle that is not significant yet: finer precisions, then a smaller
@@ -210,4 +232,34 @@ pub(super) fn improve(
         }
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By the definition: whether the places along and across of a pixel's center are between the sides.
+    #[test]
+    fn pixels_are_counted_that_lie_inside() {
+        let field = GradientField::new(&trueup_core::raster::Raster::new(60, 50, 1));
+        for angle_deg in [0.0_f64, 17.0, 45.0, 90.0, 133.0, 180.0, 211.0, 270.0, 300.0] {
+            let (sin, cos) = angle_deg.to_radians().sin_cos();
+            let rectangle = LineSupportRectangle {
+                center: [20.3, 18.6],
+                direction: [cos, sin],
+                along: [-14.2, 11.75],
+                across: [-1.35, 2.4],
+                halvings: 0,
+            };
+            let inside = |x: usize, y: usize| {
+                let (dx, dy) = (x as f64 - 20.3, y as f64 - 18.6);
+                let (along, across) = (dx * cos + dy * sin, dy * cos - dx * sin);
+                (-14.2..=11.75).contains(&along) && (-1.35..=2.4).contains(&across)
+            };
+            let expected = (1..=field.height())
+                .flat_map(|y| (1..=field.width()).map(move |x| (x, y)))
+                .filter(|&(x, y)| inside(x, y));
+            assert_eq!(rectangle.count(&field, 1.0), (expected.count(), 0), "{angle_deg} degrees");
+        }
+    }
 }

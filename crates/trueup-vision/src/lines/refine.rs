@@ -235,14 +235,17 @@ impl<'a> Scan<'a> {
     /// finds without bias. In between, the two places are off in opposite senses and a weighted mean serves.
     fn peak(&self, profile: &Profile, major: f64, expected: f64) -> Option<EdgePoint> {
         let margin = (self.filter.reach + 1) as f64;
-        let low = (expected - self.search - 0.5).ceil();
-        let high = (expected + self.search - 0.5).floor();
-        if !(low >= margin && high + margin < profile.columns as f64) {
+        let (from, to) = (expected - self.search - 0.5, expected + self.search - 0.5);
+        // The bounds are whole numbers: what lies within them does so rounded inwards, too.
+        if !(from > margin - 1.0 && to < profile.columns as f64 - margin) {
             return None;
         }
+        // As `f64::ceil`, which is a call where not every processor has the instruction.
+        let below = from as usize;
+        let (low, high) = (below + usize::from((below as f64) < from), to as usize);
         let slope_at = |column| self.sign * self.filter.slope(profile, column);
         let (mut column, mut slope) = (0, 0.0);
-        for candidate in low as usize..=high as usize {
+        for candidate in low..=high {
             let steepness = slope_at(candidate);
             if steepness > slope {
                 (column, slope) = (candidate, steepness);

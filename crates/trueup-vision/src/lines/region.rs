@@ -1,7 +1,7 @@
 //! Connected pixels whose level lines share a direction.
 
 use super::gradient::{ANGLE_TOLERANCE_DEG, GradientField};
-use super::rectangle::{LineSupportRectangle, is_aligned};
+use super::rectangle::{LineSupportRectangle, PointMass, is_aligned};
 
 /// The smallest region a rectangle can be fitted to.
 const MIN_REGION: usize = 2;
@@ -23,19 +23,26 @@ pub(super) struct RegionGrower<'a> {
     used: Vec<bool>,
     /// The region in the making, its seed first.
     region: Vec<u32>,
+    /// Its pixels, where they are looked at more than once.
+    pixels: Vec<PointMass>,
     /// Sum of the region's level lines: its direction.
     sum: [f32; 2],
     tolerance: f64,
+    /// Its tangent.
+    tangent: f32,
 }
 
 impl<'a> RegionGrower<'a> {
     pub(super) fn new(field: &'a GradientField) -> Self {
+        let tolerance = ANGLE_TOLERANCE_DEG.to_radians();
         Self {
             field,
             used: field.magnitudes().iter().map(|&magnitude| magnitude <= 0.0).collect(),
             region: Vec::new(),
+            pixels: Vec::new(),
             sum: [0.0; 2],
-            tolerance: ANGLE_TOLERANCE_DEG.to_radians(),
+            tolerance,
+            tangent: tolerance.tan() as f32,
         }
     }
 
@@ -50,7 +57,7 @@ impl<'a> RegionGrower<'a> {
         if self.used[seed as usize] {
             return None;
         }
-        self.grow(seed, self.tolerance);
+        self.grow(seed, self.tangent);
         if self.region.len() < min_region.max(MIN_REGION) {
             return None;
         }
@@ -65,20 +72,21 @@ impl<'a> RegionGrower<'a> {
         self.shrink(seed, rectangle)
     }
 
-    fn fit(&self) -> Option<LineSupportRectangle> {
-        LineSupportRectangle::around(&self.region, self.field, self.sum.map(f64::from), self.aligned_probability())
+    fn fit(&mut self) -> Option<LineSupportRectangle> {
+        self.pixels.clear();
+        self.pixels.extend(self.region.iter().map(|&index| self.field.pixel(index)));
+        LineSupportRectangle::around(&self.pixels, self.sum.map(f64::from))
     }
 
-    /// Adds 8-connected pixels within `tolerance` of the region's mean direction until there are none.
+    /// Adds 8-connected pixels, within the angle of the tangent given of the region's mean direction, until there are none.
     ///
     /// # Source
     /// IPOL, section 2.4.
-    fn grow(&mut self, seed: u32, tolerance: f64) {
+    fn grow(&mut self, seed: u32, tangent: f32) {
         let lines = self.field.level_lines();
         let stride = self.field.stride();
         // The neighbors, from the one at the upper left on.
         let offsets = [0, 1, 2, stride, stride + 2, 2 * stride, 2 * stride + 1, 2 * stride + 2];
-        let tangent = tolerance.tan() as f32;
         self.region.clear();
         self.region.push(seed);
         self.used[seed as usize] = true;
@@ -107,12 +115,13 @@ impl<'a> RegionGrower<'a> {
     fn grow_narrowly(&mut self, seed: u32, rectangle: &LineSupportRectangle) -> Option<LineSupportRectangle> {
         let lines = self.field.level_lines();
         let seed_line = lines[seed as usize];
+        let center = self.field.pixel(seed);
         let near = squared(rectangle.width());
         let (mut count, mut sum, mut sum_of_squares) = (0.0, 0.0, 0.0);
-        for &index in &self.region {
+        for (&index, pixel) in self.region.iter().zip(&self.pixels) {
+            let line = lines[index as usize];
             self.used[index as usize] = false;
-            if self.squared_distance(seed, index) < near {
-                let line = lines[index as usize];
+            if pixel.squared_distance(&center) < near {
                 let dot = line[0] * seed_line[0] + line[1] * seed_line[1];
                 let cross = seed_line[0] * line[1] - seed_line[1] * line[0];
                 let turn = f64::from(cross.atan2(dot));
@@ -124,7 +133,7 @@ impl<'a> RegionGrower<'a> {
         let variance = if count > 0.0 { sum_of_squares / count - squared(sum / count) } else { 0.0 };
         // Never wider than the first growth, which the seed's surroundings alone could suggest.
         let tolerance = (TOLERANCE_SIGMAS * variance.max(0.0).sqrt()).min(self.tolerance);
-        self.grow(seed, tolerance);
+        self.grow(seed, tolerance.tan() as f32);
         if self.region.len() < MIN_REGION { None } else { self.fit() }
     }
 
@@ -133,15 +142,18 @@ impl<'a> RegionGrower<'a> {
     /// # Source
     /// IPOL, section 2.6.
     fn shrink(&mut self, seed: u32, mut rectangle: LineSupportRectangle) -> Option<LineSupportRectangle> {
-        let (x, y) = self.field.position(seed);
-        let mut radius_squared =
-            rectangle.axis().map(|end| squared(end[0] - x) + squared(end[1] - y)).into_iter().fold(0.0, f64::max);
+        let center = self.field.pixel(seed);
+        let mut radius_squared = rectangle
+            .axis()
+            .map(|end| squared(end[0] - center.x) + squared(end[1] - center.y))
+            .into_iter()
+            .fold(0.0, f64::max);
         while rectangle.density(self.region.len()) < MIN_DENSITY {
             radius_squared *= squared(RADIUS_REDUCTION);
-            let (field, used) = (self.field, &mut self.used);
+            let used = &mut self.used;
+            let mut pixels = self.pixels.iter();
             self.region.retain(|&index| {
-                let (px, py) = field.position(index);
-                let keep = squared(px - x) + squared(py - y) <= radius_squared;
+                let keep = pixels.next().is_some_and(|pixel| pixel.squared_distance(&center) <= radius_squared);
                 used[index as usize] = keep;
                 keep
             });
@@ -151,11 +163,6 @@ impl<'a> RegionGrower<'a> {
             rectangle = self.fit()?;
         }
         Some(rectangle)
-    }
-
-    fn squared_distance(&self, first: u32, second: u32) -> f64 {
-        let ((ax, ay), (bx, by)) = (self.field.position(first), self.field.position(second));
-        squared(ax - bx) + squared(ay - by)
     }
 }
 

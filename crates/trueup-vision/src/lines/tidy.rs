@@ -41,12 +41,15 @@ pub fn merged(segments: &[LineSegment]) -> Vec<LineSegment> {
 /// Longest first; equal lengths by position, so that the order is total.
 fn sort(segments: &mut [LineSegment]) {
     let key = |segment: &LineSegment| [segment.start[1], segment.start[0], segment.end[1], segment.end[0]];
-    segments.sort_by(|a, b| {
-        b.length().total_cmp(&a.length()).then_with(|| {
+    // Each length once, not at each comparison.
+    let mut measured: Vec<(f64, LineSegment)> = segments.iter().map(|segment| (segment.length(), *segment)).collect();
+    measured.sort_by(|(a_length, a), (b_length, b)| {
+        b_length.total_cmp(a_length).then_with(|| {
             let pairs = key(a).into_iter().zip(key(b));
             pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
         })
     });
+    segments.iter_mut().zip(measured).for_each(|(segment, (_, sorted))| *segment = sorted);
 }
 
 /// Whether more than [`BORDER_SHARE`] of the segment lies within [`BORDER_DISTANCE_PX`] of one border.
