@@ -49,8 +49,9 @@ pub(crate) fn needed_bytes(unrolled: &Unrolled<'_>, levels: Option<WholeLevels>)
     let own_levels: Vec<f64> = boxes(f64::from(1 << first_level).recip(), RIM as f64).collect();
     let whole: f64 = canvas.iter().map(|&length| length.div_ceil(1 << first_level) as f64).product();
     // The level cut along the seams, sums at all levels and what one of them is interpolated to, beside some photographs'
-    // own levels.
-    let coarse = sample * (whole * (1.0 + 4.0 / 3.0 + 1.0) + threads * COARSE_COPIES * largest(&own_levels));
+    // own levels, and a byte for each sample of all: how much of it is shown.
+    let masks: f64 = own_levels.iter().sum();
+    let coarse = sample * (whole * (1.0 + 4.0 / 3.0 + 1.0) + threads * COARSE_COPIES * largest(&own_levels)) + masks;
     let side = (tile_side(first_level) + 2 * mask_margin(first_level)) as f64;
     // Those that are put on the canvas, and the next ones.
     let finished = (2 * TILES_AT_ONCE * RootPixel::BYTES) as f64 * (tile_side(first_level) as f64).powi(2);
