@@ -3,8 +3,6 @@
 use rayon::prelude::*;
 use trueup_core::raster::Raster;
 
-use super::rectangle::PointMass;
-
 /// Reduction of the picture before its gradient is taken, which removes aliasing and the staircase of pixels (IPOL,
 /// section 2.1).
 const REDUCTION: f64 = 0.8;
@@ -30,6 +28,21 @@ const GAUSSIAN_REACH_SIGMAS: f64 = 3.717;
 
 /// Rows a thread reduces at a time.
 const ROWS_PER_TASK: usize = 16;
+
+/// A pixel of a region, in the padded field's coordinates, with its gradient magnitude for mass.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PointMass {
+    pub x: f64,
+    pub y: f64,
+    pub mass: f64,
+}
+
+impl PointMass {
+    pub(super) fn squared_distance(&self, other: &Self) -> f64 {
+        let (dx, dy) = (self.x - other.x, self.y - other.y);
+        dx * dx + dy * dy
+    }
+}
 
 /// Level lines and gradient magnitudes at the nodes between the pixels of the reduced picture.
 ///

@@ -1,13 +1,10 @@
 //! Rectangles around regions of one direction, and how they are improved.
 
-use super::gradient::GradientField;
+use super::gradient::{GradientField, PointMass};
 use super::significance::FalseAlarms;
 
 /// Changes tried in each step of the improvement (IPOL, section 2.8).
 const TRIES: usize = 5;
-
-/// How often the precision may be halved, in the first step of the improvement and in the last.
-pub(super) const MOST_HALVINGS: usize = 2 * TRIES;
 
 /// What a try takes off the width, in reduced pixels (IPOL, section 2.8).
 const WIDTH_STEP_PX: f64 = 0.5;
@@ -20,21 +17,6 @@ const MIN_WIDTH_PX: f64 = 1.0;
 
 /// Pixel centers this close outside a rectangle count as inside: those that define its sides must.
 const BOUNDARY_SLACK_PX: f64 = 1e-6;
-
-/// A pixel of a region, in the padded field's coordinates, with its gradient magnitude for mass.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PointMass {
-    pub x: f64,
-    pub y: f64,
-    pub mass: f64,
-}
-
-impl PointMass {
-    pub(super) fn squared_distance(&self, other: &Self) -> f64 {
-        let (dx, dy) = (self.x - other.x, self.y - other.y);
-        dx * dx + dy * dy
-    }
-}
 
 /// A rectangle in the padded field's coordinates: a center, a direction, and intervals along and across it.
 #[derive(Debug, Clone, Copy)]

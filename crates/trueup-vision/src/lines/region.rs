@@ -1,7 +1,7 @@
 //! Connected pixels whose level lines share a direction.
 
-use super::gradient::{ANGLE_TOLERANCE_DEG, GradientField};
-use super::rectangle::{LineSupportRectangle, PointMass, is_aligned};
+use super::gradient::{ANGLE_TOLERANCE_DEG, GradientField, PointMass};
+use super::rectangle::{LineSupportRectangle, is_aligned};
 
 /// The smallest region a rectangle can be fitted to.
 const MIN_REGION: usize = 2;

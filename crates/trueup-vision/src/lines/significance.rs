@@ -2,10 +2,8 @@
 
 use std::f64::consts::{LN_10, PI, TAU};
 
-use super::rectangle::MOST_HALVINGS;
-
-/// Number of precisions a rectangle is tried with, the factor gamma of the number of tests (IPOL, section 2.7).
-const PRECISIONS_TESTED: f64 = 11.0;
+/// Number of precisions a rectangle is tried with, each half of the one before: the factor gamma of the number of tests (IPOL, section 2.7).
+const PRECISIONS_TESTED: usize = 11;
 
 /// Factorials kept in a table; above, Stirling's series is exact to double precision.
 const TABLED_FACTORIALS: usize = 2048;
@@ -21,7 +19,7 @@ pub(super) struct FalseAlarms {
     /// ln n! for small n.
     ln_factorials: Vec<f64>,
     /// The first precision, and what comes of halving it again and again.
-    precisions: [Precision; MOST_HALVINGS + 1],
+    precisions: [Precision; PRECISIONS_TESTED],
 }
 
 /// How closely a pixel must be aligned, with what follows from it.
@@ -63,7 +61,7 @@ impl FalseAlarms {
             })
             .collect();
         let precisions = std::array::from_fn(|halvings| Precision::new(probability * 0.5_f64.powi(halvings as i32)));
-        Self { log10_tests: 2.5 * area.log10() + PRECISIONS_TESTED.log10(), ln_factorials, precisions }
+        Self { log10_tests: 2.5 * area.log10() + (PRECISIONS_TESTED as f64).log10(), ln_factorials, precisions }
     }
 
     /// The fewest pixels that could be significant if all of them were aligned.
@@ -71,9 +69,9 @@ impl FalseAlarms {
         ((self.log10_tests + min_significance) / -self.precisions[0].probability.log10()).max(0.0) as usize
     }
 
-    /// The precision halved so often, at most [`MOST_HALVINGS`] times.
+    /// The precision halved so often; the last that is tested if that is more.
     pub(super) fn precision(&self, halvings: usize) -> &Precision {
-        &self.precisions[halvings.min(MOST_HALVINGS)]
+        &self.precisions[halvings.min(PRECISIONS_TESTED - 1)]
     }
 
     /// -log10 of the number of false alarms: `aligned` of `total` pixels, each aligned with `probability` in noise.
