@@ -72,12 +72,12 @@ fn putative_8000_by_8000(bencher: Bencher, threads: usize) {
     bencher.bench_local(|| pool.install(|| putative_matches(&a, &b, &options)));
 }
 
-/// A whole pair of 600 matches, half of them outliers, with and without guided matches.
-#[divan::bench(args = [true, false])]
-fn verify_half_outliers(bencher: Bencher, guided: bool) {
+/// A whole pair of 600 matches, half of them outliers.
+#[divan::bench]
+fn verify_half_outliers(bencher: Bencher) {
     let features = photographs(600, 600, 300);
     let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
-    let options = MatchingOptions { guided, ..MatchingOptions::default() };
+    let options = MatchingOptions::default();
     let context = StageContext::default();
     let forced = BTreeSet::new();
     let told = [ToldLens::default(); 2];

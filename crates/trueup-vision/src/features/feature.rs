@@ -1,7 +1,5 @@
 //! What a photograph's features are: distinctive places and the descriptions of their surroundings.
 
-use std::borrow::Cow;
-
 use serde::{Deserialize, Serialize};
 use trueup_core::{Error, Result};
 
@@ -55,19 +53,6 @@ impl Features {
             }
         }
         kept
-    }
-
-    /// The features of the `count` strongest points, all if there are no more; points keep their indices.
-    pub(crate) fn strongest(&self, count: usize) -> Cow<'_, Self> {
-        if self.points.len() <= count {
-            return Cow::Borrowed(self);
-        }
-        let descriptors = self.descriptor_points.partition_point(|&point| (point as usize) < count);
-        Cow::Owned(Self {
-            points: self.points[..count].to_vec(),
-            descriptors: self.descriptors[..descriptors].to_vec(),
-            descriptor_points: self.descriptor_points[..descriptors].to_vec(),
-        })
     }
 
     /// Checks that descriptors and points fit together, so that no index is out of range later. `photograph` is the

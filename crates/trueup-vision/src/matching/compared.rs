@@ -5,10 +5,6 @@ use super::options::MatchingOptions;
 use super::putative::{PutativeMatch, putative_matches};
 use crate::features::Features;
 
-/// Strongest features of each photograph that are compared with all such of the other. More would find smaller overlaps; the time grows with the
-/// square.
-pub(super) const COMPARED_FEATURES: usize = 4000;
-
 /// Largest number of samples drawn for the global homography. More would find pairs of which fewer matches agree.
 pub(super) const MAX_SAMPLES: usize = 6000;
 
@@ -22,10 +18,9 @@ pub(super) struct ComparedPair<'a> {
 }
 
 impl<'a> ComparedPair<'a> {
-    /// Compares the strongest `compared_features` of either.
-    pub(super) fn new(a: &'a Features, b: &'a Features, compared_features: usize, options: &MatchingOptions) -> Self {
-        let [compared_a, compared_b] = [a, b].map(|features| features.strongest(compared_features));
-        let mut putative = putative_matches(&compared_a, &compared_b, options);
+    /// Compares each of `a` with all of `b`.
+    pub(super) fn new(a: &'a Features, b: &'a Features, options: &MatchingOptions) -> Self {
+        let mut putative = putative_matches(a, b, options);
         putative.sort_by(|j, k| j.ratio.total_cmp(&k.ratio).then(j.point_a.cmp(&k.point_a)));
         let points = MatchedPoints {
             in_a: putative.iter().map(|candidate| candidate.at.in_a.into()).collect(),

@@ -13,7 +13,7 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 
-use super::compared::{COMPARED_FEATURES, ComparedPair, MAX_SAMPLES};
+use super::compared::{ComparedPair, MAX_SAMPLES};
 use super::epipolar::epipolar_matches;
 use super::matched_points::MatchedPoints;
 use super::options::MatchingOptions;
@@ -62,7 +62,7 @@ pub fn consistent_matches(
 ) -> Result<Vec<PointMatch>> {
     options.check()?;
     context.check_cancelled()?;
-    let compared = ComparedPair::new(a.features, b.features, COMPARED_FEATURES, options);
+    let compared = ComparedPair::new(a.features, b.features, options);
     let points = &compared.points;
     let mut generator = context.generator("consistent matches", compared.seed());
     let search = HomographySearch {

@@ -1,8 +1,8 @@
 //! Matches between pairs of photographs, and which pairs overlap.
 //!
-//! Descriptors of the strongest features are compared exhaustively (`putative`), a homography is sought that many matches agree on
+//! Descriptors are compared exhaustively (`putative`), a homography is sought that many matches agree on
 //! (`ransac`), the pair is judged by how many do (`pair`), and the matches of a joined pair are completed by further planes
-//! (`planes`) and by a second look near the predicted places (`guided`). Where a lens bends so that no homography holds, or is told, turns
+//! (`planes`). Where a lens bends so that no homography holds, or is told, turns
 //! are sought on rays (`turned`), and stand in for the homography. What the pairs show of each other tells which pictures are
 //! no photographs of the scene (`strangers`). Whether or not homographies explain it, `consistent` finds what two photographs show alike, to measure
 //! a panorama by (`epipolar`).
@@ -11,7 +11,6 @@ mod compared;
 mod consistent;
 mod duplicates;
 mod epipolar;
-mod guided;
 mod local;
 mod matched_points;
 mod options;

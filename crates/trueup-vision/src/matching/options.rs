@@ -13,8 +13,5 @@ trueup_core::options! {
         /// Fewest agreeing matches of a joined pair. Lower it for small overlaps with little texture; raise it where
         /// pairs are joined that do not overlap.
         min_inliers: usize = 15, between(4.0, 10000.0), "matches", basic;
-        /// Whether a joined pair is matched again near the places its homographies predict, for more and better spread
-        /// matches. Turn it off to see what the first look alone finds.
-        guided: bool = true, Allowed::Any, "";
     }
 }

@@ -10,16 +10,15 @@ use trueup_core::source::WorkingFrame;
 use trueup_core::told_lens::ToldLens;
 use trueup_core::{Error, Result, StageContext};
 
-use super::compared::{COMPARED_FEATURES, ComparedPair, MAX_SAMPLES};
+use super::compared::{ComparedPair, MAX_SAMPLES};
 use super::consistent::matches_elsewhere;
-use super::guided::{GuidedInput, PlaneMap, PointMap, guided_matches};
 use super::matched_points::MatchedPoints;
 use super::options::MatchingOptions;
 use super::overlap::PredictedOverlap;
-use super::planes::{PLANE_INLIER_PX, find_planes};
+use super::planes::find_planes;
 use super::putative::PutativeMatch;
 use super::ransac::{Consensus, HomographySearch, NoConsensus, find_homography};
-use super::turned::{TurnConsensus, find_turned_lens};
+use super::turned::{TurnConsensus, TurnedLens, find_turned_lens};
 use crate::features::Features;
 
 /// alpha of the Brown-Lowe test: a pair is joined if more than alpha + beta n_f of its n_f matches in the predicted overlap
@@ -60,16 +59,13 @@ pub(super) struct PairInput<'a> {
     pub(super) b: PhotographFeatures<'a>,
     /// Whether the user's graph joins them.
     pub(super) forced: bool,
-    /// Strongest features of each that are compared with all such of the other; those beyond are matched near the places
-    /// that these predict.
-    pub(super) compared_features: usize,
 }
 
 impl<'a> PairInput<'a> {
     /// Of two photographs in any order.
     pub(super) fn new(one: PhotographFeatures<'a>, other: PhotographFeatures<'a>, forced: bool) -> Self {
         let (a, b) = if one.index <= other.index { (one, other) } else { (other, one) };
-        Self { a, b, forced, compared_features: COMPARED_FEATURES }
+        Self { a, b, forced }
     }
 
     fn check(&self) -> Result<()> {
@@ -161,8 +157,8 @@ pub(super) fn match_pair(
     options.check()?;
     input.check()?;
     context.check_cancelled()?;
-    let PairInput { a, b, forced, compared_features } = *input;
-    let compared = ComparedPair::new(a.features, b.features, compared_features, options);
+    let PairInput { a, b, forced } = *input;
+    let compared = ComparedPair::new(a.features, b.features, options);
     let ComparedPair { putative, points, .. } = &compared;
     let mut pair = PairMatches {
         a: a.index,
@@ -212,8 +208,8 @@ pub(super) fn match_pair(
     pair.b_from_a = Some(scaled_rows(&model.b_from_a));
     input.judge(&mut pair, options);
     if pair.verdict.is_joined() {
-        let joined = JoinedPair { input, putative, points, model: &model, overlap: &overlap };
-        let (inliers, is_known) = joined.all_inliers(options, &mut generator);
+        let joined = JoinedPair { input, putative, points, model: &model };
+        let (inliers, is_known) = joined.all_inliers(&mut generator);
         pair.inliers = inliers.into();
         let mut generator = context.generator("matches elsewhere", seed);
         let cameras = model.cameras([a.frame, b.frame]);
@@ -221,6 +217,15 @@ pub(super) fn match_pair(
         pair.elsewhere = found.into_iter().map(|k| putative[k].at).collect();
     }
     Ok(pair)
+}
+
+/// Where points of a are in b.
+#[derive(Debug, Clone)]
+enum PointMap {
+    /// On a plane, or of pinholes that turned.
+    Plane(Homography),
+    /// Of another lens that turned.
+    Turn(Box<TurnedLens>),
 }
 
 /// What most matches of a pair agree with.
@@ -266,42 +271,20 @@ struct JoinedPair<'a> {
     /// Their places.
     points: &'a MatchedPoints,
     model: &'a Model,
-    overlap: &'a PredictedOverlap<'a>,
 }
 
 impl JoinedPair<'_> {
-    /// The final matches: those that agree with the model, those of further planes, those found near predicted places; and which of the putative
-    /// ones are among them.
-    fn all_inliers(&self, options: &MatchingOptions, generator: &mut impl Rng) -> (Vec<PointMatch>, Vec<bool>) {
-        let (a, b, model) = (self.input.a, self.input.b, self.model);
-        let mut plane_maps = vec![PlaneMap { b_from_a: model.map.clone(), inlier_px: options.inlier_px }];
-        let mut plane_of: Vec<Option<usize>> = vec![None; self.putative.len()];
-        let mut matches: Vec<usize> = model.inliers.clone();
-        model.inliers.iter().for_each(|&k| plane_of[k] = Some(0));
-        for plane in &self.further_planes(generator) {
-            for &k in &plane.inliers {
-                if plane_of[k].is_none() {
-                    matches.push(k);
-                    plane_of[k] = Some(plane_maps.len());
-                }
+    /// The final matches, those that agree with the model and then those of further planes; and which of the putative ones are among them.
+    fn all_inliers(&self, generator: &mut impl Rng) -> (Vec<PointMatch>, Vec<bool>) {
+        let mut is_known = vec![false; self.putative.len()];
+        let mut inliers: Vec<PointMatch> = Vec::new();
+        let of_planes = self.further_planes(generator).into_iter().flat_map(|plane| plane.inliers);
+        for k in self.model.inliers.iter().copied().chain(of_planes) {
+            if !std::mem::replace(&mut is_known[k], true) {
+                inliers.push(self.putative[k].at);
             }
-            plane_maps.push(PlaneMap { b_from_a: PointMap::Plane(plane.b_from_a), inlier_px: PLANE_INLIER_PX });
         }
-        let known: Vec<PutativeMatch> = matches.iter().map(|&k| self.putative[k]).collect();
-        let mut inliers: Vec<PointMatch> = known.iter().map(|known| known.at).collect();
-        if options.guided {
-            let plane_of_known: Vec<usize> = matches.iter().map(|&k| plane_of[k].unwrap_or(0)).collect();
-            let more = guided_matches(&GuidedInput {
-                a: a.features,
-                b: b.features,
-                known: &known,
-                plane_of_known: &plane_of_known,
-                planes: &plane_maps,
-                overlap: self.overlap,
-            });
-            inliers.extend(more.iter().map(|found| found.at));
-        }
-        (inliers, plane_of.iter().map(Option::is_some).collect())
+        (inliers, is_known)
     }
 
     /// The planes beside the model. Under a lens that bends, what the turn explains lies on planes only here and there: of such pairs they are

@@ -50,15 +50,10 @@ impl PhotographPair {
     }
 
     fn matched(&self, forced: bool, options: &MatchingOptions) -> PairMatches {
-        self.matched_by(usize::MAX, forced, options)
-    }
-
-    /// The same, of which the strongest `compared_features` are compared.
-    fn matched_by(&self, compared_features: usize, forced: bool, options: &MatchingOptions) -> PairMatches {
         let frame = frame();
         let a = PhotographFeatures { index: 0, features: &self.a, frame: &frame, told: ToldLens::default() };
         let b = PhotographFeatures { index: 1, features: &self.b, frame: &frame, told: ToldLens::default() };
-        let input = PairInput { a, b, forced, compared_features };
+        let input = PairInput { a, b, forced };
         match_pair(&input, options, &StageContext::default()).expect("valid scene")
     }
 
@@ -202,8 +197,6 @@ fn both_planes_of_a_scene_are_found() {
     assert_eq!(pair.verdict, PairVerdict::Joined);
     assert!((120..130).contains(&pair.agreeing));
     assert!(pair.inliers.len() >= 188, "{}", pair.inliers.len());
-    let unguided = MatchingOptions { guided: false, ..MatchingOptions::default() };
-    assert!(scene.matched(false, &unguided).inliers.len() > pair.agreeing + 60);
 }
 
 #[test]
@@ -213,8 +206,7 @@ fn few_matches_are_no_plane_of_their_own() {
     let mut scene = PhotographPair::default();
     scene.add_plane(&shift(-200.0), 120, 0.3, &mut generator);
     scene.add_plane(&shift(-230.0), 35, 0.3, &mut generator);
-    let unguided = MatchingOptions { guided: false, ..MatchingOptions::default() };
-    let pair = scene.matched(false, &unguided);
+    let pair = scene.matched(false, &MatchingOptions::default());
     assert!((120..130).contains(&pair.agreeing));
     assert_eq!(pair.inliers.len(), pair.agreeing);
 }
@@ -290,34 +282,6 @@ fn the_users_graph_joins_pairs_with_fewer_inliers() {
     assert_eq!((alone.verdict, alone.agreeing, alone.needed), (PairVerdict::TooFewInliers, 10, 15));
     let forced = scene.matched(true, &MatchingOptions::default());
     assert_eq!((forced.verdict, forced.needed, forced.inliers.len()), (PairVerdict::JoinedByGraph, 8, 10));
-}
-
-#[test]
-fn ambiguous_points_are_matched_near_their_predicted_places() {
-    let mut generator = generator(6);
-    let mut scene = PhotographPair::default();
-    scene.add_plane(&example_map(), 60, 0.3, &mut generator);
-    // Twenty windows that all look the same.
-    let window = random_descriptor(&mut generator);
-    for k in 0..20 {
-        let in_a = Vector2::new(350.0 + 40.0 * f64::from(k % 10), 200.0 + 150.0 * f64::from(k / 10));
-        push(&mut scene.a, in_a, &[window]);
-        push(&mut scene.b, example_map().apply(in_a), &[window]);
-    }
-    let unguided = MatchingOptions { guided: false, ..MatchingOptions::default() };
-    assert_eq!(scene.matched(false, &unguided).inliers.len(), 60);
-    assert_eq!(scene.matched(false, &MatchingOptions { guided: true, ..unguided }).inliers.len(), 80);
-}
-
-#[test]
-fn weak_features_are_matched_near_the_places_that_the_strong_ones_predict() {
-    let mut generator = generator(9);
-    let mut scene = PhotographPair::default();
-    scene.add_plane(&example_map(), 120, 0.0, &mut generator);
-    let pair = scene.matched_by(50, false, &MatchingOptions::default());
-    assert_eq!((pair.putative, pair.inliers.len()), (50, 120));
-    let unguided = MatchingOptions { guided: false, ..MatchingOptions::default() };
-    assert_eq!(scene.matched_by(50, false, &unguided).inliers.len(), 50);
 }
 
 #[test]

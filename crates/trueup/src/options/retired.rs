@@ -46,7 +46,7 @@ impl Retired {
 use Retired::{Fixed, Flag, Gone, Renamed};
 
 /// Options of version 0.1, sorted by name.
-const RETIRED: [(&str, Retired); 181] = [
+const RETIRED: [(&str, Retired); 182] = [
     ("cache.max_bytes", Renamed("resources.cache_bytes")),
     ("cameras.coarse_huber_px", Fixed("20 working px")),
     ("cameras.estimated_focal_sd", Fixed("0.3")),
@@ -116,11 +116,12 @@ const RETIRED: [(&str, Retired); 181] = [
     ("match_points.weight_floor", Fixed("0.0015")),
     ("matching.brown_lowe_alpha", Fixed("8 matches")),
     ("matching.brown_lowe_beta", Fixed("0.3")),
-    ("matching.compared_features", Fixed("4000 features")),
+    ("matching.compared_features", Gone("4000")),
     ("matching.confidence", Fixed("0.995")),
     ("matching.distance_deviations", Fixed("4.25 standard deviations")),
-    ("matching.guided_distance_ratio", Fixed("0.9")),
-    ("matching.guided_radius_px", Fixed("12 px")),
+    ("matching.guided", Gone("true")),
+    ("matching.guided_distance_ratio", Gone("0.9")),
+    ("matching.guided_radius_px", Gone("12")),
     ("matching.max_area_ratio", Fixed("20")),
     ("matching.max_plane_displacement", Fixed("0.25 diagonals")),
     ("matching.max_plane_samples", Fixed("3308 samples")),
