@@ -8,6 +8,11 @@ pub(crate) const DECAY_PX: f64 = 72.25;
 /// Smallest weight of a match; it keeps vertices far from all matches determined.
 const WEIGHT_FLOOR: f64 = 0.0015;
 
+/// How many matches tell of a place (source pixels): the sum of their weights, each 1 at the place itself.
+pub(crate) fn matches_around(positions: &[Vector2<f64>], place: Vector2<f64>) -> f64 {
+    positions.iter().map(|position| (-(position - place).norm() / DECAY_PX).exp()).sum()
+}
+
 /// Matches prepared for fitting many local homographies.
 ///
 /// # Source
@@ -161,6 +166,13 @@ mod tests {
         let moving = MovingDlt::new(&source, &target).and_then(|dlt| dlt.at(vertex)).expect("regular");
         let weighted = Homography::fit(&source, &target, Some(&weights)).expect("regular");
         assert!((moving.apply(vertex) - weighted.apply(vertex)).norm() < 1e-5);
+    }
+
+    /// 1 at the place, 1/e a decay length away, next to nothing far away.
+    #[test]
+    fn matches_count_by_how_near_they_are() {
+        let positions = [Vector2::new(10.0, 20.0), Vector2::new(10.0 + DECAY_PX, 20.0), Vector2::new(1e4, 0.0)];
+        assert!((matches_around(&positions, Vector2::new(10.0, 20.0)) - 1.0 - (-1.0_f64).exp()).abs() < 1e-12);
     }
 
     #[test]

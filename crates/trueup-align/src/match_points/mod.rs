@@ -18,7 +18,10 @@ use residual::{CameraResidual, MAX_DEVIATION};
 
 use crate::cameras::{CameraTransfer, Cameras};
 use crate::evidence::{self, FULL_PX, NEGLIGIBLE_SHARE};
-use crate::moving_dlt::MovingDlt;
+use crate::moving_dlt::{self, MovingDlt};
+
+/// Matches that fix a homography.
+const FIXING_MATCHES: f64 = 4.0;
 
 /// The vertices of photograph `from`'s grid carried into photograph `to` (working pixels).
 #[derive(Debug, Clone, PartialEq)]
@@ -140,7 +143,9 @@ impl Transfer<'_> {
     /// By the cameras, corrected, where the photographs were taken from one point, and by the matches where they were
     /// not: the mean of both, weighed by how far neighboring matches agree that the cameras are wrong.
     ///
-    /// The noise of matches has nothing in common: photographs taken from one point keep the cameras' consistency.
+    /// The noise of matches has nothing in common: photographs taken from one point keep the cameras' consistency. Where the
+    /// cameras are wrong and the matches far, nothing is known: a vertex is carried if the matches around it count for
+    /// [`FIXING_MATCHES`] times the share of what they say.
     fn by_cameras_and_matches(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<Vector2<f64>>> {
         let cameras = CameraResidual::new(self.cameras, self.source, self.target);
         let by_cameras = (0..grid.len()).map(|vertex| cameras.at(grid.source(vertex)));
@@ -151,7 +156,9 @@ impl Transfer<'_> {
         // Where the matches determine no homography the cameras alone must do.
         let by_matches = self.by_matches(frame);
         let mean = |(vertex, camera): (usize, Option<Vector2<f64>>)| {
-            camera.map(|camera| by_matches(grid.source(vertex)).map_or(camera, |matches| camera.lerp(&matches, share)))
+            let (at, camera) = (grid.source(vertex), camera?);
+            let is_told = moving_dlt::matches_around(self.source, at) >= FIXING_MATCHES * share;
+            is_told.then(|| by_matches(at).map_or(camera, |matches| camera.lerp(&matches, share)))
         };
         by_cameras.enumerate().map(mean).collect()
     }

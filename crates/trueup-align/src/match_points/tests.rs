@@ -185,3 +185,26 @@ fn without_a_homography_the_cameras_carry() {
         assert!((deviation - Vector2::new(6.0, 0.0)).norm() < 1.0, "{deviation}");
     }
 }
+
+/// With matches on the left alone, vertices on the right are carried by cameras that are right; where the cameras are wrong, nothing tells
+/// where they belong.
+#[test]
+fn under_parallax_vertices_far_from_all_matches_are_not_carried() {
+    let (frames, cameras, pair) = example();
+    let grids = vec![GridMesh::regular(800.0, 600.0, 40.0); 2];
+    let far_carried = |shift: f64| {
+        let mut pair = pair.clone();
+        pair.inliers = pair.inliers.iter().copied().filter(|one| one.in_a[0] < 450.0).collect();
+        pair.inliers.iter_mut().for_each(|one| one.in_b[0] += shift);
+        let (source, target) = ends(&pair);
+        pair.b_from_a = Homography::fit(&source, &target, None).map(|homography| homography.to_rows());
+        let options = MatchPointOptions::default();
+        let warps = run(&frames, &grids, &rotating(&cameras), &[pair], &options, &StageContext::default());
+        let warps = warps.expect("not cancelled");
+        let far = |&vertex: &usize| grids[0].source(vertex).x > 750.0;
+        (0..grids[0].len()).filter(far).filter(|&vertex| warps[0].vertices[vertex].is_some()).count()
+    };
+    // 300 px and more from some 200 matches: each counts for 0.016 and less.
+    assert_eq!(far_carried(8.0), 0);
+    assert!(far_carried(0.0) > 10);
+}
