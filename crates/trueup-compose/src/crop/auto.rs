@@ -2,7 +2,7 @@
 
 use super::cells::Cells;
 use super::search::{Best, Worths};
-use super::smooth::{Fillable, near};
+use super::smooth::{Fillable, Smoothness, near};
 use super::worth::{UpperEnd, Worth};
 use crate::coverage::{Coverage, Rectangle};
 use crate::gaps::FRAME_REACH;
@@ -31,35 +31,71 @@ const BEHEADED: f32 = 0.3;
 /// How much more it costs if the end rises above most of what is beside it, for each part of the panorama's longer side by
 /// which it does: a tower that rises by a tenth counts four times as much as a roof among roofs.
 const PROMINENT: f32 = 30.0;
+/// Share of the panorama's longer side by which a thing rises above most of what is beside it that is not to be cut off: a tower.
+const TOWERING: f32 = 0.04;
 /// Half the width of the thing that an upper end belongs to, as a share of the panorama's longer side: a spire counts as much
 /// as the tower that bears it.
 const BEARER: f64 = 0.02;
 
-/// The rectangle of a canvas, seen in `cells`, that loses least of what matters and has no holes but smooth ones; of a full turn,
-/// of all its width. `None` if there is none. `may_end`: whether things may end in front of what is filled at no cost.
-pub(super) fn rectangle(cells: &Cells, layout: &CanvasLayout, coverage: &Coverage, may_end: bool) -> Option<Rectangle> {
+/// What may be filled of a rectangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Filling {
+    /// What goes on smoothly, at a cost where a thing ends in front of it.
+    Unnoticed,
+    /// That at no such cost.
+    Ending,
+    /// What goes on smoothly at that cost, and at none above a row of pixels, where also what goes on as clouds do.
+    CloudsAbove(usize),
+}
+
+/// A rectangle of a canvas.
+#[derive(Debug, Clone)]
+pub(super) struct Chosen {
+    pub(super) rectangle: Rectangle,
+    /// Whether it cuts off the upper end of a thing that towers above what is beside it.
+    pub(super) beheads: bool,
+}
+
+/// The rectangle of a canvas, seen in `cells`, that loses least of what matters and has no holes but such as may be filled; of a full
+/// turn, of all its width. `None` if there is none.
+pub(super) fn rectangle(cells: &Cells, layout: &CanvasLayout, coverage: &Coverage, filling: Filling) -> Option<Chosen> {
     let reach = (FRAME_REACH * layout.photograph_side() / cells.side as f64) as usize;
-    let fillable = Fillable::of(cells, reach.min(cells.columns + cells.rows));
-    let ended = if may_end { 0.0 } else { ENDED };
-    let best = worths(cells, &fillable, ended).best(cells.around)?;
+    let reach = reach.min(cells.columns + cells.rows);
+    let mut fillable = Fillable::of(cells, Smoothness::SKY, reach);
+    let free_rows = match filling {
+        Filling::Unnoticed => 0,
+        Filling::Ending => cells.rows,
+        Filling::CloudsAbove(row) => row.div_ceil(cells.side),
+    };
+    if let Filling::CloudsAbove(_) = filling {
+        let above = free_rows * cells.columns;
+        let clouds = Fillable::of(cells, Smoothness::CLOUDS, reach);
+        fillable.smooth[..above].copy_from_slice(&clouds.smooth[..above]);
+    }
+    let mut worth = Worth::of(cells);
+    let longer = cells.columns.max(cells.rows) as f32;
+    worth.ends = widened(&worth.ends, (BEARER * f64::from(longer)).round() as usize);
+    let best = worths(cells, &worth, &fillable, free_rows).best(cells.around)?;
     let is_open = |x: usize, y: usize| {
         coverage.holds(x, y) || fillable.smooth[y / cells.side * cells.columns + x / cells.side].is_some()
     };
-    Some(grown(&best, cells.side, [layout.width, layout.height], is_open))
+    let is_cut = |end: &UpperEnd| best.rows.start > end.top && end.prominence as f32 >= TOWERING * longer;
+    let beheads = worth.ends[best.columns.clone()].iter().flatten().any(is_cut);
+    Some(Chosen { rectangle: grown(&best, cells.side, [layout.width, layout.height], is_open), beheads })
 }
 
-/// What every cell and every cut is worth; `ended` is [`ENDED`], or 0.
-fn worths(cells: &Cells, fillable: &Fillable, ended: f32) -> Worths {
+/// What every cell and every cut is worth. In the first `free_rows` it costs nothing if a thing ends in front of what is filled.
+fn worths(cells: &Cells, worth: &Worth, fillable: &Fillable, free_rows: usize) -> Worths {
     let (columns, rows) = (cells.columns, cells.rows);
-    let Worth { edges, salience, ends } = Worth::of(cells);
+    let Worth { edges, salience, ends } = worth;
     let longer = columns.max(rows) as f32;
-    let ends = widened(&ends, (BEARER * f64::from(longer)).round() as usize);
     let beheaded = |end: &UpperEnd| BEHEADED * (longer + PROMINENT * end.prominence as f32);
     let cell = |at: usize| match cells.covered[at] {
         true => Some(1.0 + THING * salience[at]),
         false => fillable.smooth[at].map(|smooth| {
             let edge = near(cells, at).map(|other| edges[other] - CALM_EDGE).fold(0.0, f32::max);
-            -FILLED - FILLED_BESIDE_ROUGH * (1.0 - smooth) - ended * longer * edge * smooth.powi(3)
+            let ended = if at < free_rows * columns { 0.0 } else { ENDED * longer * edge * smooth.powi(3) };
+            -FILLED - FILLED_BESIDE_ROUGH * (1.0 - smooth) - ended
         }),
     };
     // What two cells have of one thing.

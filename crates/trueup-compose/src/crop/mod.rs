@@ -14,6 +14,7 @@ mod worth;
 use trueup_core::Result;
 use trueup_core::raster::RowSource;
 
+use self::auto::Filling;
 use crate::gaps::Gaps;
 use crate::layout::{CanvasLayout, CanvasOptions, Placed};
 
@@ -89,11 +90,17 @@ impl Framing<'_> {
     pub(crate) fn of_cells(&self, cells: &Cells, layout: &CanvasLayout) -> Frame {
         let enough = self.options.min_kept * self.coverage.area() as f64;
         let is_enough = |kept: &Rectangle| self.coverage.area_within(kept) as f64 >= enough;
+        let chosen = |filling| {
+            let chosen = auto::rectangle(cells, layout, self.coverage, filling);
+            chosen.filter(|chosen| is_enough(&chosen.rectangle))
+        };
+        let first = chosen(Filling::Unnoticed);
+        // A filling that is seen is better than a tower without its top.
+        let beheading = first.as_ref().filter(|first| first.beheads).map(|first| first.rectangle.rows.start);
+        let with_tops = beheading.and_then(|row| chosen(Filling::CloudsAbove(row)).filter(|other| !other.beheads));
         // A thing that ends in the picture is better than ragged borders; so is one that is cut.
-        let of_things = [false, true].into_iter();
-        let of_things = of_things.filter_map(|may_end| auto::rectangle(cells, layout, self.coverage, may_end));
-        let mut rectangles = of_things.chain(std::iter::once_with(|| self.largest(layout)));
-        self.frame(rectangles.find(is_enough))
+        let of_things = with_tops.or(first).or_else(|| chosen(Filling::Ending)).map(|chosen| chosen.rectangle);
+        self.frame(of_things.or_else(|| Some(self.largest(layout)).filter(is_enough)))
     }
 
     fn frame(&self, rectangle: Option<Rectangle>) -> Frame {

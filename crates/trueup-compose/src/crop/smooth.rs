@@ -3,10 +3,21 @@
 use super::cells::Cells;
 use super::worth::box_means;
 
-/// Largest standard deviation of the luma in a smooth cell, levels: noise of a sky, its slope, and soft clouds.
-const SMOOTH_DEVIATION: f32 = 6.0;
-/// Largest contrast between smooth cells beside each other, levels.
-const SMOOTH_CONTRAST: f32 = 10.0;
+/// What counts as smooth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Smoothness {
+    /// Largest standard deviation of the luma in a smooth cell, levels.
+    deviation: f32,
+    /// Largest contrast between smooth cells beside each other, levels.
+    contrast: f32,
+}
+
+impl Smoothness {
+    /// Noise of a sky, its slope, and soft clouds.
+    pub(super) const SKY: Self = Self { deviation: 6.0, contrast: 10.0 };
+    /// Clouds with edges.
+    pub(super) const CLOUDS: Self = Self { deviation: 10.0, contrast: 20.0 };
+}
 
 /// Half the side of the square over which the border of what is covered is judged, as a share of the panorama's longer side: the
 /// colors of what is filled come from as far as it is deep, so that a twig, a wire or the edge of a cloud at one place of a sky's
@@ -27,8 +38,8 @@ impl Fillable {
     /// Empty cells beside a smooth border, no farther than `reach` cells from it: from the covered cells outwards, step by
     /// step, each is as smooth as those beside it that were reached before are in the mean. Cells of the border are as smooth as
     /// the share of it within [`BORDER_STRETCH`] is.
-    pub(super) fn of(cells: &Cells, reach: usize) -> Self {
-        let border: Vec<Option<bool>> = (0..cells.covered.len()).map(|at| smooth_border(cells, at)).collect();
+    pub(super) fn of(cells: &Cells, smooth: Smoothness, reach: usize) -> Self {
+        let border: Vec<Option<bool>> = (0..cells.covered.len()).map(|at| smooth_border(cells, smooth, at)).collect();
         let is_border: Vec<bool> = border.iter().map(Option::is_some).collect();
         let is_smooth: Vec<f32> =
             border.iter().map(|smooth| if smooth.is_some_and(|smooth| smooth) { 1.0 } else { 0.0 }).collect();
@@ -81,11 +92,11 @@ pub(super) fn near(cells: &Cells, at: usize) -> impl Iterator<Item = usize> {
 }
 
 /// Whether a covered cell beside an empty one, and what is covered around it, is smooth; `None` for all other cells.
-fn smooth_border(cells: &Cells, at: usize) -> Option<bool> {
+fn smooth_border(cells: &Cells, smooth: Smoothness, at: usize) -> Option<bool> {
     let is_border = cells.covered[at] && near(cells, at).any(|other| !cells.covered[other]);
     is_border.then(|| {
         near(cells, at)
             .filter(|&other| cells.covered[other])
-            .all(|other| cells.deviations[other] <= SMOOTH_DEVIATION && cells.contrast(at, other) <= SMOOTH_CONTRAST)
+            .all(|other| cells.deviations[other] <= smooth.deviation && cells.contrast(at, other) <= smooth.contrast)
     })
 }

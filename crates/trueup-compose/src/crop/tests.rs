@@ -163,6 +163,25 @@ fn the_edge_of_a_cloud_costs_no_tower_its_top() {
     assert!(tree.rows.start >= 30 || tree.columns.end <= 200, "{tree:?}");
 }
 
+/// A tower rises above a wall into rows that end beside it, under clouds of 11 levels from cell to cell: too uneven to be filled, except
+/// that the tower keeps its top. Where cells themselves are uneven, by 12 levels, it does not.
+#[test]
+fn clouds_are_filled_for_a_tower_to_keep_its_top() {
+    let layout = layout(400, 300, &[upright(0.0, 60.0, 400.0, 300.0), upright(0.0, 0.0, 200.0, 200.0)]);
+    let scene = |grain: u8| {
+        move |x: usize, y: usize| match (y >= 90, (90..110).contains(&x) && y >= 20) {
+            (true, _) => rough(x, y),
+            (false, true) => 60,
+            // Cells are two pixels wide.
+            _ => 160 + 11 * (x / 2 % 6).abs_diff(3) as u8 + if (x + y).is_multiple_of(2) { grain } else { 0 },
+        }
+    };
+    let clouds = kept(&layout, Crop::Auto, scene(0)).expect("a rectangle");
+    assert_eq!((clouds.columns, clouds.rows.start <= 20), (0..400, true), "{:?}", clouds.rows);
+    let crowns = kept(&layout, Crop::Auto, scene(24)).expect("a rectangle");
+    assert_eq!((crowns.columns, crowns.rows.start), (0..400, 60));
+}
+
 /// Beside an even sky the corner that is missing is filled; where a post runs out of the photograph below, it is not, unless that would keep
 /// too little.
 #[test]

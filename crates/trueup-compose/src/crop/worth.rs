@@ -38,6 +38,8 @@ pub(super) struct Worth {
 pub(super) struct UpperEnd {
     /// The first row of cells that is to be kept for it.
     pub(super) row: usize,
+    /// Its own first row of cells.
+    pub(super) top: usize,
     /// Rows of cells by which it rises above most of what ends beside it.
     pub(super) prominence: usize,
 }
@@ -126,7 +128,7 @@ fn ends(cells: &Cells, salience: &[f32], longer: f64) -> Vec<Option<UpperEnd>> {
             rows[x.saturating_sub(reach)..(x + reach + 1).min(rows.len())].iter().copied().flatten().collect();
         beside.sort_unstable();
         let prominence = beside[beside.len() / 2].saturating_sub(row);
-        Some(UpperEnd { row: row - headroom / 2, prominence })
+        Some(UpperEnd { row: row - headroom / 2, top: row, prominence })
     };
     (0..rows.len()).map(with_prominence).collect()
 }
