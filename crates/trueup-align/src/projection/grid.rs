@@ -115,8 +115,9 @@ impl<'a> Drawing<'a> {
     /// How far the middle of two vertices' places is from the place of the pixel between, in pixels; `None` where there
     /// is nothing to see.
     fn sag(&self, from: DrawnVertex, to: DrawnVertex) -> Option<f64> {
-        /// A cell that is wider on the turn goes round a pole.
-        const WIDEST: f64 = PI / 2.0;
+        /// A cell with a wider side on the turn may go round a pole: of the four sides of one that does, the widest is a quarter of the turn
+        /// or more. Such a cell lies in no sector and leaves a hole of its size.
+        const WIDEST: f64 = 0.45 * PI;
         let flat = &self.placement.view.flat;
         let pixel = (from.pixel + to.pixel) / 2.0;
         let (start, mut end, mut true_place) = (from.place?, to.place?, self.place(pixel)?);
@@ -155,15 +156,28 @@ impl<'a> Drawing<'a> {
                 pixel: self.pixel(&lines, row, column),
                 place: places[row * columns + column],
             };
-            let worst = |sags: &mut dyn Iterator<Item = Option<f64>>| sags.flatten().fold(0.0, f64::max);
-            let across: Vec<f64> = (0..columns - 1)
-                .map(|column| worst(&mut (0..rows).map(|row| self.sag(vertex(row, column), vertex(row, column + 1)))))
-                .collect();
-            let down: Vec<f64> = (0..rows - 1)
-                .map(|row| {
-                    worst(&mut (0..columns).map(|column| self.sag(vertex(row, column), vertex(row + 1, column))))
-                })
-                .collect();
+            let (mut across, mut down) = (vec![0.0_f64; columns - 1], vec![0.0_f64; rows - 1]);
+            // The intervals on both sides of a line.
+            let beside = |line: usize, lines: usize| line.saturating_sub(1)..(line + 1).min(lines - 1);
+            for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+                // A cell that goes round a pole is to be small both ways.
+                if column + 1 < columns
+                    && let Some(sag) = self.sag(vertex(row, column), vertex(row, column + 1))
+                {
+                    across[column] = across[column].max(sag);
+                    if sag.is_infinite() {
+                        down[beside(row, rows)].fill(sag);
+                    }
+                }
+                if row + 1 < rows
+                    && let Some(sag) = self.sag(vertex(row, column), vertex(row + 1, column))
+                {
+                    down[row] = down[row].max(sag);
+                    if sag.is_infinite() {
+                        across[beside(column, columns)].fill(sag);
+                    }
+                }
+            }
             let finer = GridLines {
                 columns: divided(&lines.columns, &across, smallest / self.photograph.mesh.width),
                 rows: divided(&lines.rows, &down, smallest / self.photograph.mesh.height),
@@ -321,6 +335,37 @@ mod tests {
             }
         }
         assert!(grids.iter().all(|grid| grid.mesh.len() < 60_000), "{}", grids[0].mesh.len());
+    }
+
+    /// Wherever the pole lies in its cell.
+    #[test]
+    fn cells_beside_a_pole_are_small_both_ways() {
+        let view = view(FlatKind::Equirectangular);
+        for k in 0..8 {
+            let sky = photograph(10.0 + 7.3 * f64::from(k), 85.0 + 0.61 * f64::from(k));
+            let grids = placed(&[sky], &view, false);
+            for longitude in (0..90).map(|k| (4.0 * f64::from(k) - 179.0).to_radians()) {
+                let place = Vector2::new(longitude, 0.5 / 700.0 - PI / 2.0);
+                assert!(grids.iter().any(|grid| covers(&grid.mesh, place)), "pose {k}: {place} is not covered");
+            }
+        }
+    }
+
+    /// A square of 0.6 px with the zenith in its middle, whose sides are a quarter of the turn each: smaller than what sags, but a hole as
+    /// long as it is one cell.
+    #[test]
+    fn a_cell_around_a_pole_is_divided() {
+        let (view, sky) = (view(FlatKind::Equirectangular), photograph(0.0, 90.0));
+        let shift = ParallaxShift { aside: vec![Vector2::zeros(); sky.mesh.len()] };
+        let placement = Placement { view: &view, canvas_from_plane: 700.0, closed: false };
+        let drawing = Drawing::new(&sky, &shift, &placement);
+        let corners = [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]].map(|[x, y]| {
+            let pixel = Vector2::new(400.0 + x, 300.0 + y);
+            DrawnVertex { pixel, place: drawing.place(pixel) }
+        });
+        for side in 0..4 {
+            assert_eq!(drawing.sag(corners[side], corners[(side + 1) % 4]), Some(f64::INFINITY));
+        }
     }
 
     fn covers(mesh: &GridMesh, place: Vector2<f64>) -> bool {
