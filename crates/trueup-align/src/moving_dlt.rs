@@ -10,7 +10,12 @@ const WEIGHT_FLOOR: f64 = 0.0015;
 
 /// How many matches tell of a place (source pixels): the sum of their weights, each 1 at the place itself.
 pub(crate) fn matches_around(positions: &[Vector2<f64>], place: Vector2<f64>) -> f64 {
-    positions.iter().map(|position| (-(position - place).norm() / DECAY_PX).exp()).sum()
+    positions.iter().map(|position| weight_at((position - place).norm())).sum()
+}
+
+/// The weight of a match at a distance, pixels.
+fn weight_at(distance: f64) -> f64 {
+    (-distance / DECAY_PX).exp()
 }
 
 /// Matches prepared for fitting many local homographies.
@@ -66,11 +71,7 @@ impl MovingDlt {
         let floor_px = -WEIGHT_FLOOR.ln() * DECAY_PX;
         self.solve(|position| {
             let square = (position - vertex).norm_squared();
-            if square >= floor_px * floor_px {
-                WEIGHT_FLOOR
-            } else {
-                (-square.sqrt() / DECAY_PX).exp().max(WEIGHT_FLOOR)
-            }
+            if square >= floor_px * floor_px { WEIGHT_FLOOR } else { weight_at(square.sqrt()).max(WEIGHT_FLOOR) }
         })
     }
 

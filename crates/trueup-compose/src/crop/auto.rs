@@ -1,5 +1,7 @@
 //! The rectangle that loses least of what matters.
 
+use std::borrow::Cow;
+
 use super::cells::Cells;
 use super::search::{Best, Worths};
 use super::smooth::{Fillable, Smoothness, near};
@@ -56,39 +58,64 @@ pub(super) struct Chosen {
     pub(super) beheads: bool,
 }
 
-/// The rectangle of a canvas, seen in `cells`, that loses least of what matters and has no holes but such as may be filled; of a full
-/// turn, of all its width. `None` if there is none.
-pub(super) fn rectangle(cells: &Cells, layout: &CanvasLayout, coverage: &Coverage, filling: Filling) -> Option<Chosen> {
-    let reach = (FRAME_REACH * layout.photograph_side() / cells.side as f64) as usize;
-    let reach = reach.min(cells.columns + cells.rows);
-    let mut fillable = Fillable::of(cells, Smoothness::SKY, reach);
-    let free_rows = match filling {
-        Filling::Unnoticed => 0,
-        Filling::Ending => cells.rows,
-        Filling::CloudsAbove(row) => row.div_ceil(cells.side),
-    };
-    if let Filling::CloudsAbove(_) = filling {
-        let above = free_rows * cells.columns;
-        let clouds = Fillable::of(cells, Smoothness::CLOUDS, reach);
-        fillable.smooth[..above].copy_from_slice(&clouds.smooth[..above]);
+/// A canvas, and what of it matters and may be filled.
+pub(super) struct Choice<'a> {
+    cells: &'a Cells,
+    layout: &'a CanvasLayout,
+    coverage: &'a Coverage,
+    worth: Worth,
+    /// Cells from what is covered up to which it may be filled.
+    reach: usize,
+    sky: Fillable,
+}
+
+impl<'a> Choice<'a> {
+    /// Among the rectangles of a canvas that is seen in `cells`.
+    pub(super) fn new(cells: &'a Cells, layout: &'a CanvasLayout, coverage: &'a Coverage) -> Self {
+        let mut worth = Worth::of(cells);
+        worth.ends = widened(&worth.ends, (BEARER * f64::from(longer_side(cells))).round() as usize);
+        let reach = (FRAME_REACH * layout.photograph_side() / cells.side as f64) as usize;
+        let reach = reach.min(cells.columns + cells.rows);
+        let sky = Fillable::of(cells, Smoothness::SKY, reach);
+        Self { cells, layout, coverage, worth, reach, sky }
     }
-    let mut worth = Worth::of(cells);
-    let longer = cells.columns.max(cells.rows) as f32;
-    worth.ends = widened(&worth.ends, (BEARER * f64::from(longer)).round() as usize);
-    let best = worths(cells, &worth, &fillable, free_rows).best(cells.around)?;
-    let is_open = |x: usize, y: usize| {
-        coverage.holds(x, y) || fillable.smooth[y / cells.side * cells.columns + x / cells.side].is_some()
-    };
-    let is_cut = |end: &UpperEnd| best.rows.start > end.top && end.prominence as f32 >= TOWERING * longer;
-    let beheads = worth.ends[best.columns.clone()].iter().flatten().any(is_cut);
-    Some(Chosen { rectangle: grown(&best, cells.side, [layout.width, layout.height], is_open), beheads })
+
+    /// The rectangle that loses least of what matters and has no holes but such as may be filled; of a full turn, of all its width.
+    /// `None` if there is none.
+    pub(super) fn rectangle(&self, filling: Filling) -> Option<Chosen> {
+        let Self { cells, layout, worth, .. } = self;
+        let (fillable, free_rows) = match filling {
+            Filling::Unnoticed => (Cow::Borrowed(&self.sky), 0),
+            Filling::Ending => (Cow::Borrowed(&self.sky), cells.rows),
+            Filling::CloudsAbove(row) => {
+                let rows = row.div_ceil(cells.side);
+                let mut fillable = Fillable::of(cells, Smoothness::CLOUDS, self.reach);
+                let below = rows * cells.columns;
+                fillable.smooth[below..].copy_from_slice(&self.sky.smooth[below..]);
+                (Cow::Owned(fillable), rows)
+            }
+        };
+        let best = worths(cells, worth, &fillable, free_rows).best(cells.around)?;
+        let is_open = |x: usize, y: usize| {
+            self.coverage.holds(x, y) || fillable.smooth[y / cells.side * cells.columns + x / cells.side].is_some()
+        };
+        let towering = TOWERING * longer_side(cells);
+        let is_cut = |end: &UpperEnd| best.rows.start > end.top && end.prominence as f32 >= towering;
+        let beheads = worth.ends[best.columns.clone()].iter().flatten().any(is_cut);
+        Some(Chosen { rectangle: grown(&best, cells.side, [layout.width, layout.height], is_open), beheads })
+    }
+}
+
+/// Cells along the panorama's longer side.
+fn longer_side(cells: &Cells) -> f32 {
+    cells.columns.max(cells.rows) as f32
 }
 
 /// What every cell and every cut is worth. In the first `free_rows` it costs nothing if a thing ends in front of what is filled.
 fn worths(cells: &Cells, worth: &Worth, fillable: &Fillable, free_rows: usize) -> Worths {
     let (columns, rows) = (cells.columns, cells.rows);
     let Worth { edges, salience, ends } = worth;
-    let longer = columns.max(rows) as f32;
+    let longer = longer_side(cells);
     let beheaded = |end: &UpperEnd| BEHEADED * (longer + PROMINENT * end.prominence as f32);
     let cell = |at: usize| match cells.covered[at] {
         true => Some(1.0 + THING * salience[at]),

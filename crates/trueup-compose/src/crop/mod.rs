@@ -14,7 +14,7 @@ mod worth;
 use trueup_core::Result;
 use trueup_core::raster::RowSource;
 
-use self::auto::Filling;
+use self::auto::{Choice, Filling};
 use crate::gaps::Gaps;
 use crate::layout::{CanvasLayout, CanvasOptions, Placed};
 
@@ -90,10 +90,8 @@ impl Framing<'_> {
     pub(crate) fn of_cells(&self, cells: &Cells, layout: &CanvasLayout) -> Frame {
         let enough = self.options.min_kept * self.coverage.area() as f64;
         let is_enough = |kept: &Rectangle| self.coverage.area_within(kept) as f64 >= enough;
-        let chosen = |filling| {
-            let chosen = auto::rectangle(cells, layout, self.coverage, filling);
-            chosen.filter(|chosen| is_enough(&chosen.rectangle))
-        };
+        let choice = Choice::new(cells, layout, self.coverage);
+        let chosen = |filling| choice.rectangle(filling).filter(|chosen| is_enough(&chosen.rectangle));
         let first = chosen(Filling::Unnoticed);
         // A filling that is seen is better than a tower without its top.
         let beheading = first.as_ref().filter(|first| first.beheads).map(|first| first.rectangle.rows.start);

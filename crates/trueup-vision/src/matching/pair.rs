@@ -190,7 +190,7 @@ pub(super) fn match_pair(
         (Some(turn), _) => Model::of_turn(&turn, points),
         (None, Ok(global)) => {
             let Consensus { b_from_a, inliers } = global;
-            Some(Model { map: PointMap::Plane(b_from_a), b_from_a, inliers })
+            Some(Model { turned: None, b_from_a, inliers })
         }
         (None, Err(failure)) => {
             pair.verdict = match failure {
@@ -219,19 +219,11 @@ pub(super) fn match_pair(
     Ok(pair)
 }
 
-/// Where points of a are in b.
-#[derive(Debug, Clone)]
-enum PointMap {
-    /// On a plane, or of pinholes that turned.
-    Plane(Homography),
-    /// Of another lens that turned.
-    Turn(Box<TurnedLens>),
-}
-
 /// What most matches of a pair agree with.
 struct Model {
-    map: PointMap,
-    /// The homography that says nearly the same of them.
+    /// The lens that turned, if it was no pinhole.
+    turned: Option<TurnedLens>,
+    /// The homography; beside a lens that turned the one that says nearly the same of the matches.
     b_from_a: Homography,
     /// Indices of the agreeing matches, ascending.
     inliers: Vec<usize>,
@@ -242,21 +234,21 @@ impl Model {
     fn of_turn(turn: &TurnConsensus, points: &MatchedPoints) -> Option<Self> {
         let at = points.select(&turn.inliers);
         let b_from_a = Homography::fit(&at.in_a, &at.in_b, None)?;
-        Some(Self { map: PointMap::Turn(Box::new(turn.turned)), b_from_a, inliers: turn.inliers.clone() })
+        Some(Self { turned: Some(turn.turned), b_from_a, inliers: turn.inliers.clone() })
     }
 
     fn overlap<'a>(&self, frame_a: &'a WorkingFrame, frame_b: &'a WorkingFrame) -> Option<PredictedOverlap<'a>> {
-        match &self.map {
-            PointMap::Plane(b_from_a) => PredictedOverlap::new(*b_from_a, frame_a, frame_b),
-            PointMap::Turn(turned) => Some(PredictedOverlap::of_turn(**turned, frame_a, frame_b)),
+        match self.turned {
+            None => PredictedOverlap::new(self.b_from_a, frame_a, frame_b),
+            Some(turned) => Some(PredictedOverlap::of_turn(turned, frame_a, frame_b)),
         }
     }
 
     /// Cameras of about the photographs' lenses: those that turned, else pinholes of a focal length of the longer side.
     fn cameras(&self, frames: [&WorkingFrame; 2]) -> [Camera; 2] {
-        match &self.map {
-            PointMap::Turn(turned) => [turned.a, turned.b],
-            PointMap::Plane(_) => frames.map(|frame| {
+        match self.turned {
+            Some(turned) => [turned.a, turned.b],
+            None => frames.map(|frame| {
                 Camera::new(frame.width.max(frame.height), frame.width, frame.height, &Matrix3::identity())
             }),
         }
@@ -292,9 +284,9 @@ impl JoinedPair<'_> {
     fn further_planes(&self, generator: &mut impl Rng) -> Vec<Consensus> {
         let is_plausible = |map: &Homography| self.input.is_plausible(map);
         let (map, diagonal_px) = (&self.model.b_from_a, self.input.b.frame.diagonal());
-        let PointMap::Turn(_) = &self.model.map else {
+        if self.model.turned.is_none() {
             return find_planes(self.points, map, diagonal_px, is_plausible, generator);
-        };
+        }
         let is_left = |k: &usize| self.model.inliers.binary_search(k).is_err();
         let left: Vec<usize> = (0..self.putative.len()).filter(is_left).collect();
         let planes = find_planes(&self.points.select(&left), map, diagonal_px, is_plausible, generator);

@@ -7,7 +7,7 @@ use super::matched_points::MatchedPoints;
 use super::ransac::{Consensus, HomographySearch, find_homography};
 
 /// How far a match may lie from where a further plane's homography predicts it, in working pixels.
-pub(super) const PLANE_INLIER_PX: f64 = 3.0;
+const PLANE_INLIER_PX: f64 = 3.0;
 
 /// Fewest matches of a further plane.
 const MIN_PLANE_INLIERS: usize = 40;

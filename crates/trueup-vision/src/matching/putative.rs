@@ -11,7 +11,7 @@ const DUPLICATE_PX: f64 = 0.5;
 
 /// How far from the nearest point the second-nearest must lie in the photograph, in working pixels; nearer ones are the
 /// same place.
-pub(super) const SECOND_SEPARATION_PX: f64 = 3.0;
+const SECOND_SEPARATION_PX: f64 = 3.0;
 
 /// Matches are dropped whose squared distance exceeds the pair's mean by more than so many standard deviations (as in the
 /// implementation of natural image stitching with the global similarity prior).
