@@ -29,8 +29,8 @@ pub struct MatchedPair<'a> {
     pub matches: Vec<PointMatch>,
 }
 
-/// Measures how far apart matched points land, each distance divided by the local scale there, the root mean square of
-/// the two photographs' own. `None` without a match that lies in unfolded places of both. On a full turn whose ends
+/// Measures how far apart matched points land, each way from one to the other as long as it is in the photographs there: the root mean
+/// square of its lengths in the two. That counts a way across the stretched rows beside a sphere's pole as what it shows. `None` without a match that lies in unfolded places of both. On a full turn whose ends
 /// meet, distances are taken modulo its `period`.
 pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reprojection> {
     let mut distances: Vec<f64> =
@@ -52,27 +52,34 @@ pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reproj
 /// How far apart each match of a pair lands, in the order of the matches, measured as by [`reprojection`]; not finite where
 /// that is no number.
 pub fn match_distances(pair: &MatchedPair, period: Option<f64>) -> impl Iterator<Item = f64> {
-    let scale = |one: &PointMatch| {
-        ((squared_scale(pair.a, one.in_a.into()) + squared_scale(pair.b, one.in_b.into())) / 2.0).sqrt()
-    };
-    pair.matches.iter().zip(panorama_distances(pair, period)).map(move |(one, distance)| distance / scale(one))
+    let own_square = |mesh: &GridMesh, point: [f64; 2], way: Vector2<f64>| squared_length_in(mesh, point.into(), way);
+    pair.matches
+        .iter()
+        .zip(panorama_ways(pair, period))
+        .map(move |(one, way)| ((own_square(pair.a, one.in_a, way) + own_square(pair.b, one.in_b, way)) / 2.0).sqrt())
 }
 
 /// How far apart each match of a pair lands, in the order of the matches, in pixels of the panorama; not finite where that is no number.
 pub fn panorama_distances(pair: &MatchedPair, period: Option<f64>) -> impl Iterator<Item = f64> {
+    panorama_ways(pair, period).map(|way| way.norm())
+}
+
+/// The way from each match's place in the second photograph to that in the first, in pixels of the panorama.
+fn panorama_ways(pair: &MatchedPair, period: Option<f64>) -> impl Iterator<Item = Vector2<f64>> {
     pair.matches.iter().map(move |one| {
         let way = pair.a.warp(one.in_a.into()) - pair.b.warp(one.in_b.into());
-        wrap_length(way.x, period).hypot(way.y)
+        Vector2::new(wrap_length(way.x, period), way.y)
     })
 }
 
 /// The share of the distances below the percentile, by its nearest rank.
 const PERCENTILE: f64 = 0.95;
 
-/// How much the grid magnifies areas at a point of the photograph; NaN where it is folded.
-fn squared_scale(mesh: &GridMesh, point: Vector2<f64>) -> f64 {
-    let area = mesh.derivative(point).determinant();
-    if area > 0.0 { area } else { f64::NAN }
+/// The square of a panorama way's length in the photograph, by what the grid does around a point; NaN where it is folded.
+fn squared_length_in(mesh: &GridMesh, point: Vector2<f64>, way: Vector2<f64>) -> f64 {
+    let derivative = mesh.derivative(point);
+    let unfolded = (derivative.determinant() > 0.0).then(|| derivative.try_inverse()).flatten();
+    unfolded.map_or(f64::NAN, |photograph_from_panorama| (photograph_from_panorama * way).norm_squared())
 }
 
 #[cfg(test)]
@@ -96,15 +103,20 @@ mod tests {
         assert!((found.percentile_95_px - 19.0).abs() < 1e-9);
     }
 
-    /// x to x^2 / 100, y kept: at x = 25 areas are halved, at x = 75 enlarged by one and a half.
+    /// x to x^2 / 100, y kept: at x = 24.5 ways along x are twice as long in the photograph (1 / 0.49), at x = 75 two thirds; across, as long.
     #[test]
-    fn the_scale_is_that_of_the_place() {
+    fn a_way_is_as_long_as_in_the_photograph() {
         let mut mesh = GridMesh::regular(100.0, 100.0, 1.0);
         for vertex in &mut mesh.target {
             vertex[0] = vertex[0] * vertex[0] / 100.0;
         }
-        assert!((squared_scale(&mesh, Vector2::new(24.5, 50.0)) - 0.49).abs() < 1e-9);
-        assert!((squared_scale(&mesh, Vector2::new(74.5, 50.0)) - 1.49).abs() < 1e-9);
+        let length = |x: f64, way: [f64; 2]| squared_length_in(&mesh, Vector2::new(x, 50.0), way.into()).sqrt();
+        assert!((length(24.5, [0.98, 0.0]) - 2.0).abs() < 1e-9);
+        assert!((length(74.5, [2.98, 0.0]) - 2.0).abs() < 1e-9);
+        assert!((length(24.5, [0.0, 3.0]) - 3.0).abs() < 1e-9);
+        let mut folded = mesh.clone();
+        folded.target.iter_mut().for_each(|vertex| vertex[0] = -vertex[0]);
+        assert!(squared_length_in(&folded, Vector2::new(24.5, 50.0), Vector2::x()).is_nan());
     }
 
     #[test]

@@ -272,6 +272,9 @@ fn divided(lines: &[f64], sags: &[f64], shortest: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use trueup_core::camera::Camera;
+    use trueup_core::geometry::{rotation_about_x, rotation_about_y};
+
     use super::super::coverage::tests::photograph;
     use super::super::flat::{Flat, FlatKind};
     use super::*;
@@ -326,27 +329,27 @@ mod tests {
         let (view, sky) = (view(FlatKind::Equirectangular), photograph(10.0, 87.0));
         let grids = placed(&[sky], &view, false);
         assert!(grids.len() >= 4);
-        for k in 0..360 {
-            let longitude = (f64::from(k) - 179.5).to_radians();
-            for from_pole in [0.5_f64, 1.5, 5.0, 30.0, 150.0] {
-                let place = Vector2::new(longitude, from_pole / 700.0 - PI / 2.0);
-                let covering = grids.iter().filter(|grid| covers(&grid.mesh, place)).count();
-                assert!(covering >= 1, "{place} is not covered");
-            }
-        }
+        assert_whole(&grids, 700.0, &[0.5, 1.5, 5.0, 30.0, 150.0]);
         assert!(grids.iter().all(|grid| grid.mesh.len() < 60_000), "{}", grids[0].mesh.len());
     }
 
-    /// Wherever the pole lies in its cell.
+    /// Wherever the pole lies in its cell, and in the photograph: toward a corner, cells are no squares on the sphere, and those beside
+    /// the pole may take more than a quarter of the turn.
     #[test]
-    fn cells_beside_a_pole_are_small_both_ways() {
+    fn cells_beside_a_pole_lie_in_one_sector() {
         let view = view(FlatKind::Equirectangular);
-        for k in 0..8 {
-            let sky = photograph(10.0 + 7.3 * f64::from(k), 85.0 + 0.61 * f64::from(k));
-            let grids = placed(&[sky], &view, false);
-            for longitude in (0..90).map(|k| (4.0 * f64::from(k) - 179.0).to_radians()) {
-                let place = Vector2::new(longitude, 0.5 / 700.0 - PI / 2.0);
-                assert!(grids.iter().any(|grid| covers(&grid.mesh, place)), "pose {k}: {place} is not covered");
+        for k in (0..12).map(f64::from) {
+            let level_from_camera =
+                rotation_about_x((90.0 - 1.57 * k).to_radians()) * rotation_about_y((2.3 * k).to_radians());
+            let sky = PosedPhotograph {
+                camera: Camera::new(700.0, 800.0, 600.0, &level_from_camera.transpose()),
+                mesh: GridMesh::regular(800.0, 600.0, 20.0),
+            };
+            let shift = ParallaxShift { aside: vec![Vector2::zeros(); sky.mesh.len()] };
+            for canvas_from_plane in [700.0, 2500.0] {
+                let placement = Placement { view: &view, canvas_from_plane, closed: false };
+                let grids = place(std::slice::from_ref(&sky), std::slice::from_ref(&shift), &placement);
+                assert_whole(&grids, canvas_from_plane, &[0.5, 1.5, 2.5, 3.5, 8.5]);
             }
         }
     }
@@ -368,11 +371,26 @@ mod tests {
         }
     }
 
-    fn covers(mesh: &GridMesh, place: Vector2<f64>) -> bool {
-        mesh.whole_cells().any(|corners| {
-            let corners = corners.map(|vertex| Vector2::from(mesh.target[vertex]));
-            (0..4).all(|k| (corners[(k + 1) % 4] - corners[k]).perp(&(place - corners[k])) >= 0.0)
-        })
+    /// Asserts that every place that far from the zenith, in canvas pixels, lies in a whole cell.
+    fn assert_whole(grids: &[PlacedGrid], canvas_from_plane: f64, from_pole: &[f64]) {
+        let latitude = |rows: f64| rows / canvas_from_plane - PI / 2.0;
+        let lowest = from_pole.iter().copied().map(latitude).fold(f64::MIN, f64::max);
+        let cells: Vec<[Vector2<f64>; 4]> = grids
+            .iter()
+            .flat_map(|grid| {
+                grid.mesh.whole_cells().map(|corners| corners.map(|vertex| grid.mesh.target[vertex].into()))
+            })
+            .filter(|corners: &[Vector2<f64>; 4]| corners.iter().any(|corner| corner.y < lowest))
+            .collect();
+        for &rows in from_pole {
+            for degrees in (0..360).map(|k| f64::from(k) - 179.5) {
+                let place = Vector2::new(degrees.to_radians(), latitude(rows));
+                let is_covered = cells
+                    .iter()
+                    .any(|cell| (0..4).all(|k| (cell[(k + 1) % 4] - cell[k]).perp(&(place - cell[k])) >= 0.0));
+                assert!(is_covered, "{degrees} degrees, {rows} px from the pole: no cell");
+            }
+        }
     }
 
     #[test]

@@ -80,7 +80,8 @@ fn alignment(measures: &Measures) -> Option<String> {
 }
 
 fn bent_line(measures: &Measures, project: &Project, names: &[String]) -> Option<String> {
-    let lines = measures.long_lines.as_ref()?;
+    // A full turn bows level lines, as it should.
+    let lines = measures.long_lines.as_ref().filter(|_| !project.canvas.full_turn)?;
     Some(match &lines.longest_bent {
         None => format!("none of {} long lines is bent", lines.lines),
         Some(line) => format!(

@@ -104,7 +104,7 @@ impl Page<'_> {
                 Some(Verdict::LookAtIt) => "look",
                 None => "none",
             };
-            let verdict = verdict.map_or("not measured".to_owned(), |verdict| verdict.to_string());
+            let verdict = verdict.map_or("not judged".to_owned(), |verdict| verdict.to_string());
             json!({ "what": what, "class": class, "verdict": verdict, "meaning": meaning })
         });
         json!({

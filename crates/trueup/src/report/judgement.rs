@@ -65,12 +65,13 @@ pub struct Judgement {
     pub upright: Option<Verdict>,
     /// How well photographs meet: by the distances of matched points.
     pub alignment: Option<Verdict>,
-    /// How straight lines are: by the longest that is bent.
+    /// How straight lines are: by the longest that is bent. `None` for a full turn, which bows level lines wherever cameras are right; a viewer
+    /// that looks round in it shows them straight.
     pub lines: Option<Verdict>,
 }
 
 impl Project {
-    /// What the measures that were recorded mean; `None` for figures that were not measured.
+    /// What the measures that were recorded mean; `None` for figures that were not measured, or say nothing of this panorama.
     pub fn judgement(&self) -> Judgement {
         let Some(measures) = &self.measures else { return Judgement::default() };
         let upright = measures.upright.as_ref().map(|upright| upright.within_deg.unwrap_or(upright.max_deg));
@@ -78,9 +79,11 @@ impl Project {
         Judgement {
             upright: upright.map(|degrees| Verdict::of(degrees, LEAN_DEG)),
             alignment: apart.map(|apart| Verdict::of(apart, self.limits_apart_px())),
-            lines: measures.long_lines.as_ref().map(|lines| match &lines.longest_bent {
-                None => Verdict::Good,
-                Some(line) => Verdict::of(line.off_px / line.length_px, BENT),
+            lines: measures.long_lines.as_ref().filter(|_| !self.canvas.full_turn).map(|lines| {
+                match &lines.longest_bent {
+                    None => Verdict::Good,
+                    Some(line) => Verdict::of(line.off_px / line.length_px, BENT),
+                }
             }),
         }
     }
@@ -171,7 +174,6 @@ fn misaligned(
 fn bent(project: &Project, measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Option<Diagnostic> {
     let mend = match project.projection.map(|projection| projection.kind) {
         None | Some(FlatKind::Perspective) => "--structure lines keeps long lines straight.",
-        Some(_) if project.canvas.full_turn => "A full turn bows level lines; fewer photographs keep them straight.",
         Some(_) => {
             "A view as wide as this bows lines; fewer photographs, or --projection perspective, keep them straight."
         }
@@ -277,7 +279,8 @@ mod tests {
         }
         project.projection = Some(serde_json::from_value(view("equirectangular")).expect("a view"));
         project.canvas.full_turn = true;
-        assert!(!hint(&project).contains("--"), "{}", hint(&project));
+        assert!(warnings(&project, &[]).is_empty());
+        assert_eq!(project.judgement().lines, None);
     }
 
     #[test]
