@@ -45,6 +45,7 @@ fn photographs(count: usize, matched: usize, inliers: usize) -> [Features; 2] {
         points: places.iter().map(|&position| FeaturePoint { position, scale_px: 2.0, response: 10.0 }).collect(),
         descriptor_points: (0..count as u32).collect(),
         descriptors,
+        ..Features::default()
     })
 }
 

@@ -1,6 +1,7 @@
 //! What a photograph's features are: distinctive places and the descriptions of their surroundings.
 
 use serde::{Deserialize, Serialize};
+use trueup_core::raster::Raster;
 use trueup_core::{Error, Result};
 
 /// Length of a SIFT descriptor: 4 x 4 spatial bins of 8 orientations.
@@ -32,13 +33,16 @@ pub struct Features {
     pub descriptors: Vec<Descriptor>,
     /// For every descriptor, the index of its point.
     pub descriptor_points: Vec<u32>,
+    /// The picture they were found in, gray and a little smoothed, by which matches are placed more exactly than points are found; empty where it is
+    /// not known.
+    pub surroundings: Raster<u8>,
 }
 
 impl Features {
-    /// Those whose points satisfy `wanted`, in their order.
+    /// Those whose points satisfy `wanted`, in their order, with all that surrounds them.
     #[must_use]
     pub fn filtered(&self, wanted: impl Fn(&FeaturePoint) -> bool) -> Self {
-        let mut kept = Self::default();
+        let mut kept = Self { surroundings: self.surroundings.clone(), ..Self::default() };
         let mut number = vec![None; self.points.len()];
         for (point, number) in self.points.iter().zip(&mut number) {
             if wanted(point) {

@@ -13,6 +13,7 @@ mod patch;
 mod scale_space;
 mod simd;
 mod source;
+mod surroundings;
 
 #[cfg(test)]
 mod tests;
@@ -55,10 +56,11 @@ const NEIGHBOR_ROWS: usize = 16;
 /// Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004.
 pub fn detect(picture: &Raster<f32>, options: &FeatureOptions, context: &StageContext) -> Result<Features> {
     let instructions = InstructionSet::detect();
-    match enough_at_original(picture, options, instructions, context)? {
-        Some(features) => Ok(features),
-        None => detect_at(SearchSize::Doubled, picture, options, instructions, context),
-    }
+    let found = match enough_at_original(picture, options, instructions, context)? {
+        Some(features) => features,
+        None => detect_at(SearchSize::Doubled, picture, options, instructions, context)?,
+    };
+    Ok(Features { surroundings: surroundings::smoothed(picture), ..found })
 }
 
 /// The features of a photograph at its own size; `None` where they are so few that it is searched again.

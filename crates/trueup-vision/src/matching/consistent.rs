@@ -18,6 +18,7 @@ use super::epipolar::epipolar_matches;
 use super::matched_points::MatchedPoints;
 use super::options::MatchingOptions;
 use super::ransac::{HomographySearch, find_homography};
+use super::refined::Refiner;
 use crate::features::Features;
 
 /// Distance from the epipolar geometry up to which a match agrees with it, working pixels: four times what places of features err by.
@@ -83,7 +84,9 @@ pub fn consistent_matches(
         return Ok(Vec::new());
     }
     let found = |k: usize| PointMatch { in_a: points.in_a[k].into(), in_b: points.in_b[k].into() };
-    Ok(agreeing.into_iter().map(found).collect())
+    let refiner = Refiner { a: &a.features.surroundings, b: &b.features.surroundings };
+    let matches = agreeing.into_iter().map(found).collect();
+    Ok(refiner.refined(matches, |point| Some(most.b_from_a.apply(point))))
 }
 
 /// How matches moved beside a homography, and whether their neighbors moved alike.

@@ -3,7 +3,7 @@
 //! Descriptors are compared exhaustively (`putative`), a homography is sought that many matches agree on
 //! (`ransac`), the pair is judged by how many do (`pair`), and the matches of a joined pair are completed by further planes
 //! (`planes`). Where a lens bends so that no homography holds, or is told, turns
-//! are sought on rays (`turned`), and stand in for the homography. What the pairs show of each other tells which pictures are
+//! are sought on rays (`turned`), and stand in for the homography. What surrounds a match places it more exactly than its features (`refined`). What the pairs show of each other tells which pictures are
 //! no photographs of the scene (`strangers`). Whether or not homographies explain it, `consistent` finds what two photographs show alike, to measure
 //! a panorama by (`epipolar`).
 
@@ -19,6 +19,7 @@ mod pair;
 mod planes;
 mod putative;
 mod ransac;
+mod refined;
 mod search;
 mod strangers;
 #[cfg(test)]

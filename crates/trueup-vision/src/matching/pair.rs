@@ -1,6 +1,6 @@
 //! One pair: whether its photographs overlap, and all its matches.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector2};
 use rand::Rng;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::Homography;
@@ -18,6 +18,7 @@ use super::overlap::PredictedOverlap;
 use super::planes::find_planes;
 use super::putative::PutativeMatch;
 use super::ransac::{Consensus, HomographySearch, NoConsensus, find_homography};
+use super::refined::Refiner;
 use super::turned::{TurnConsensus, TurnedLens, find_turned_lens};
 use crate::features::Features;
 
@@ -210,11 +211,13 @@ pub(super) fn match_pair(
     if pair.verdict.is_joined() {
         let joined = JoinedPair { input, putative, points, model: &model };
         let (inliers, is_known) = joined.all_inliers(&mut generator);
-        pair.inliers = inliers.into();
+        let refiner = Refiner { a: &a.features.surroundings, b: &b.features.surroundings };
+        let in_b = |point| model.in_b(point);
+        pair.inliers = refiner.refined(inliers, in_b).into();
         let mut generator = context.generator("matches elsewhere", seed);
         let cameras = model.cameras([a.frame, b.frame]);
         let found = matches_elsewhere(points, &is_known, &model.b_from_a, &cameras, b.frame, &mut generator);
-        pair.elsewhere = found.into_iter().map(|k| putative[k].at).collect();
+        pair.elsewhere = refiner.refined(found.into_iter().map(|k| putative[k].at).collect(), in_b).into();
     }
     Ok(pair)
 }
@@ -235,6 +238,14 @@ impl Model {
         let at = points.select(&turn.inliers);
         let b_from_a = Homography::fit(&at.in_a, &at.in_b, None)?;
         Some(Self { turned: Some(turn.turned), b_from_a, inliers: turn.inliers.clone() })
+    }
+
+    /// Where a point of photograph a is in b's pixels.
+    fn in_b(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
+        match self.turned {
+            None => Some(self.b_from_a.apply(point)),
+            Some(turned) => turned.in_b(point),
+        }
     }
 
     fn overlap<'a>(&self, frame_a: &'a WorkingFrame, frame_b: &'a WorkingFrame) -> Option<PredictedOverlap<'a>> {

@@ -20,7 +20,7 @@ fn row(count: usize, shared: usize) -> Vec<Features> {
         };
         let points = (0..descriptors.len()).map(point).collect();
         let descriptor_points = (0..descriptors.len() as u32).collect();
-        Features { points, descriptors, descriptor_points }
+        Features { points, descriptors, descriptor_points, ..Features::default() }
     };
     (0..count).map(photograph).collect()
 }

@@ -35,8 +35,8 @@ const PIXEL_BYTES: usize = 4;
 /// copy when it is turned upright.
 const DECODING: usize = 2;
 
-/// Bytes of a photograph's features, as detailed ones have: 5,000 descriptors, of 170 bytes with their points.
-const FEATURES_OF_ONE: usize = 850_000;
+/// Bytes of a photograph's features, as detailed ones have: 5,000 descriptors, of 170 bytes with their points, and what surrounds them.
+const FEATURES_OF_ONE: usize = 1_330_000;
 
 /// The part of the memory that features may have at least until they are matched, whatever measuring leaves: 1 / 16, and of what is counted for
 /// the program a little.

@@ -40,20 +40,21 @@ impl<'de> Deserialize<'de> for Measured {
 
 /// A raster as it is kept.
 #[derive(Debug, Serialize, Deserialize)]
-struct StoredRaster {
+pub(crate) struct StoredRaster {
     width: usize,
     height: usize,
     channels: usize,
+    #[serde(with = "serde_bytes")]
     data: Vec<u8>,
 }
 
 impl StoredRaster {
-    fn new(raster: &Raster<u8>) -> Self {
+    pub(crate) fn new(raster: &Raster<u8>) -> Self {
         let (width, height, channels) = (raster.width(), raster.height(), raster.channels());
         Self { width, height, channels, data: raster.data().to_vec() }
     }
 
-    fn restored(self) -> Option<Raster<u8>> {
+    pub(crate) fn restored(self) -> Option<Raster<u8>> {
         Raster::from_data(self.width, self.height, self.channels, self.data).ok()
     }
 }
@@ -65,6 +66,7 @@ struct StoredMeasured {
     points: Vec<FeaturePoint>,
     descriptors: Vec<u8>,
     descriptor_points: Vec<u32>,
+    surroundings: StoredRaster,
     lines: Vec<LineSegment>,
     curves: Vec<EdgeCurve>,
     gray: Option<StoredRaster>,
@@ -74,12 +76,13 @@ struct StoredMeasured {
 
 impl StoredMeasured {
     fn new(measured: &Measured) -> trueup_core::Result<Self> {
-        let Features { points, descriptors, descriptor_points } = measured.features.get()?.into_owned();
+        let Features { points, descriptors, descriptor_points, surroundings } = measured.features.get()?.into_owned();
         Ok(Self {
             frame: measured.frame,
             points,
             descriptors: descriptors.into_flattened(),
             descriptor_points,
+            surroundings: StoredRaster::new(&surroundings),
             lines: measured.lines.clone(),
             curves: measured.curves.clone(),
             gray: measured.gray.as_ref().map(StoredRaster::new),
@@ -99,6 +102,7 @@ impl StoredMeasured {
                 points: self.points,
                 descriptors: descriptors.to_vec(),
                 descriptor_points: self.descriptor_points,
+                surroundings: self.surroundings.restored()?,
             }),
             lines: self.lines,
             curves: self.curves,

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use trueup_core::Result;
+use trueup_core::raster::Raster;
 use trueup_core::scratch::{ScratchFile, ScratchSpace};
 use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
 
@@ -41,7 +42,7 @@ impl<'a> Shelf<'a> {
     pub(crate) fn put(&self, features: Features) -> ShelvedFeatures {
         let bytes = bytes_of(&features);
         let Some((file, offset)) = self.place(bytes) else { return ShelvedFeatures::Held(features) };
-        let place = Place { offset, points: features.points.len(), descriptors: features.descriptors.len() };
+        let place = Place::new(offset, &features);
         match place.write(&features, file.as_ref()) {
             Ok(()) => ShelvedFeatures::OnDisk { file, place },
             Err(_) => {
@@ -117,19 +118,29 @@ impl ShelvedFeatures {
     }
 }
 
-/// Where in a file features lie: points, then descriptors, then the points of these.
+/// Where in a file features lie: points, then descriptors, then the points of these, then what surrounds them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
     offset: u64,
     points: usize,
     descriptors: usize,
+    /// Width, height and channels of what surrounds them.
+    surroundings: [usize; 3],
 }
 
 impl Place {
-    /// Where descriptors and their points begin.
-    fn offsets(&self) -> [u64; 2] {
+    /// Where so many bytes of features begin.
+    fn new(offset: u64, features: &Features) -> Self {
+        let Features { points, descriptors, surroundings, .. } = features;
+        let surroundings = [surroundings.width(), surroundings.height(), surroundings.channels()];
+        Self { offset, points: points.len(), descriptors: descriptors.len(), surroundings }
+    }
+
+    /// Where descriptors, their points and what surrounds them begin.
+    fn offsets(&self) -> [u64; 3] {
         let descriptors = self.offset + (self.points * size_of::<StoredPoint>()) as u64;
-        [descriptors, descriptors + (self.descriptors * DESCRIPTOR_LENGTH) as u64]
+        let owners = descriptors + (self.descriptors * DESCRIPTOR_LENGTH) as u64;
+        [descriptors, owners, owners + (self.descriptors * size_of::<u32>()) as u64]
     }
 
     fn write(&self, features: &Features, file: &dyn ScratchFile) -> Result<()> {
@@ -137,30 +148,37 @@ impl Place {
             [point.position[0], point.position[1], point.scale_px, point.response]
         };
         let points: Vec<StoredPoint> = features.points.iter().map(stored).collect();
-        let [descriptors, owners] = self.offsets();
+        let [descriptors, owners, surroundings] = self.offsets();
         file.write_at(bytemuck::cast_slice(&points), self.offset)?;
         file.write_at(features.descriptors.as_flattened(), descriptors)?;
-        file.write_at(bytemuck::cast_slice(&features.descriptor_points), owners)
+        file.write_at(bytemuck::cast_slice(&features.descriptor_points), owners)?;
+        file.write_at(features.surroundings.data(), surroundings)
     }
 
     fn read(&self, file: &dyn ScratchFile) -> Result<Features> {
         let mut points: Vec<StoredPoint> = vec![[0.0; 4]; self.points];
         let mut descriptors = vec![[0; DESCRIPTOR_LENGTH]; self.descriptors];
         let mut descriptor_points = vec![0_u32; self.descriptors];
+        let [width, height, channels] = self.surroundings;
+        let mut surroundings = Raster::new(width, height, channels);
         let offsets = self.offsets();
         file.read_at(bytemuck::cast_slice_mut(&mut points), self.offset)?;
         file.read_at(descriptors.as_flattened_mut(), offsets[0])?;
         file.read_at(bytemuck::cast_slice_mut(&mut descriptor_points), offsets[1])?;
+        file.read_at(surroundings.data_mut(), offsets[2])?;
         let restored =
             |&[x, y, scale_px, response]: &StoredPoint| FeaturePoint { position: [x, y], scale_px, response };
-        Ok(Features { points: points.iter().map(restored).collect(), descriptors, descriptor_points })
+        Ok(Features { points: points.iter().map(restored).collect(), descriptors, descriptor_points, surroundings })
     }
 }
 
 /// What features take, in memory as in a file.
 fn bytes_of(features: &Features) -> usize {
-    let Features { points, descriptors, descriptor_points } = features;
-    size_of_val(points.as_slice()) + size_of_val(descriptors.as_slice()) + size_of_val(descriptor_points.as_slice())
+    let Features { points, descriptors, descriptor_points, surroundings } = features;
+    size_of_val(points.as_slice())
+        + size_of_val(descriptors.as_slice())
+        + size_of_val(descriptor_points.as_slice())
+        + surroundings.data().len()
 }
 
 #[cfg(test)]
@@ -181,6 +199,7 @@ mod tests {
             // Two of every point.
             descriptors: (0..2 * count).map(|k| std::array::from_fn(|entry| (7 * k + entry) as u8)).collect(),
             descriptor_points: (0..2 * count as u32).map(|k| k / 2).collect(),
+            surroundings: Raster::from_data(count, 4, 1, (0..4 * count).map(|k| k as u8).collect()).expect("as many"),
         }
     }
 
@@ -188,14 +207,15 @@ mod tests {
         one.points == other.points
             && one.descriptors == other.descriptors
             && one.descriptor_points == other.descriptor_points
+            && one.surroundings == other.surroundings
     }
 
-    /// Of ten points: 10 of 32 bytes, and 20 times 128 and 4 bytes: 2960 in all.
+    /// Of ten points: 10 of 32 bytes, 20 times 128 and 4 bytes, and 40 pixels: 3000 in all.
     #[test]
     fn what_has_no_room_in_memory_comes_back_from_the_disk() {
         let desk = tempfile::tempdir().expect("a folder");
         let scratch = ScratchFolder::new(desk.path());
-        assert_eq!(bytes_of(&features(10)), 2960);
+        assert_eq!(bytes_of(&features(10)), 3000);
         let shelf = Shelf::new(&scratch, 3, 3000);
         let shelved = [10, 11, 0, 4].map(|count| shelf.put(features(count)));
         let on_disk = shelved.each_ref().map(|one| matches!(one, ShelvedFeatures::OnDisk { .. }));

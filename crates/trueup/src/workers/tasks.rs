@@ -17,7 +17,7 @@ use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
 
 use crate::memo::PROGRAM;
 use crate::options::StitchOptions;
-use crate::pipeline::measured::Measured;
+use crate::pipeline::measured::{Measured, StoredRaster};
 
 /// What tasks of one kind have in common.
 #[derive(Debug, Serialize, Deserialize)]
@@ -96,17 +96,19 @@ pub(super) struct FeaturesOfOne {
     #[serde(with = "serde_bytes")]
     descriptors: Vec<u8>,
     descriptor_points: Vec<u32>,
+    surroundings: StoredRaster,
 }
 
 impl FeaturesOfOne {
     pub(super) fn new(features: &Features, frame: WorkingFrame, told: ToldLens) -> Self {
-        let Features { points, descriptors, descriptor_points } = features;
+        let Features { points, descriptors, descriptor_points, surroundings } = features;
         Self {
             frame,
             told,
             points: points.clone(),
             descriptors: descriptors.concat(),
             descriptor_points: descriptor_points.clone(),
+            surroundings: StoredRaster::new(surroundings),
         }
     }
 
@@ -114,7 +116,9 @@ impl FeaturesOfOne {
     pub(super) fn restored(self) -> Option<(Features, WorkingFrame, ToldLens)> {
         let (descriptors, rest) = self.descriptors.as_chunks::<DESCRIPTOR_LENGTH>();
         let descriptors = rest.is_empty().then(|| descriptors.to_vec())?;
-        let features = Features { points: self.points, descriptors, descriptor_points: self.descriptor_points };
+        let (points, descriptor_points, surroundings) =
+            (self.points, self.descriptor_points, self.surroundings.restored()?);
+        let features = Features { points, descriptors, descriptor_points, surroundings };
         Some((features, self.frame, self.told))
     }
 }
