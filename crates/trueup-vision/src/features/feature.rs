@@ -59,23 +59,24 @@ impl Features {
         kept
     }
 
-    /// Checks that descriptors and points fit together, so that no index is out of range later. `photograph` is the
+    /// Checks that descriptors and points fit together and their surroundings are gray, so that no index is out of range later. `photograph` is the
     /// index by which an error names their photograph.
     ///
     /// # Errors
-    /// [`Error::Input`] if they do not, or if positions are not finite.
+    /// [`Error::Input`] if they do not, if positions are not finite, or if what surrounds them is not gray.
     pub(crate) fn check(&self, photograph: usize) -> Result<()> {
-        let owners = &self.descriptor_points;
+        let (owners, surroundings) = (&self.descriptor_points, &self.surroundings);
         let consistent = owners.len() == self.descriptors.len()
             && owners.is_sorted()
             && owners.last().is_none_or(|&last| (last as usize) < self.points.len())
-            && self.points.iter().all(|point| point.position.iter().all(|x| x.is_finite()));
+            && self.points.iter().all(|point| point.position.iter().all(|x| x.is_finite()))
+            && (surroundings.channels() == 1 || surroundings.data().is_empty() && surroundings.width() == 0);
         if consistent {
             return Ok(());
         }
         Err(Error::input(
             format!("features of photograph {photograph}"),
-            "descriptors and points do not fit together, or positions are not finite",
+            "descriptors and points do not fit together, positions are not finite, or the picture around them is not gray",
             "Detect the features anew.",
         ))
     }

@@ -4,7 +4,8 @@ use rand::{Rng, RngExt};
 use trueup_core::Error;
 use trueup_core::diagnostics::Subject;
 use trueup_core::geometry::Homography;
-use trueup_core::matches::PairVerdict;
+use trueup_core::matches::{PairVerdict, PointMatch};
+use trueup_core::raster::Raster;
 
 use super::*;
 use crate::features::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint};
@@ -317,6 +318,35 @@ fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
     assert_eq!((diagnostics[0].code.as_str(), &diagnostics[0].subject), ("near-duplicate", &Subject::Pair(0, 2)));
 }
 
+/// Waves that the map carries from one photograph into the other; features are off by up to 0.6 px along each axis.
+#[test]
+fn matches_are_placed_by_what_surrounds_them() {
+    let truth = example_map();
+    let back = Homography(truth.0.try_inverse().expect("regular"));
+    let waves = |place: Vector2<f64>| {
+        let sum = (0.5 * place.x + 0.1 * place.y).sin() + (0.6 * place.y - 0.2 * place.x).sin();
+        (110.0 + 40.0 * sum).round() as u8
+    };
+    let picture = |scene_from_picture: &dyn Fn(Vector2<f64>) -> Vector2<f64>| {
+        let (width, height) = (WIDTH as usize, HEIGHT as usize);
+        let place = |k: usize| Vector2::new((k % width) as f64 + 0.5, (k / width) as f64 + 0.5);
+        let values = (0..width * height).map(|k| waves(scene_from_picture(place(k)))).collect();
+        Raster::from_data(width, height, 1, values).expect("as many")
+    };
+    let mut photographs = PhotographPair::default();
+    photographs.add_plane(&truth, 200, 0.6, &mut generator(31));
+    photographs.a.surroundings = picture(&|place| place);
+    photographs.b.surroundings = picture(&|place| back.apply(place));
+    let matched = photographs.matched(false, &MatchingOptions::default());
+    let error = |one: &PointMatch| (Vector2::from(one.in_b) - truth.apply(one.in_a.into())).norm();
+    let exact = matched.inliers.iter().filter(|one| error(one) < 0.05).count();
+    assert!(
+        matched.inliers.len() > 150 && exact * 10 > matched.inliers.len() * 9,
+        "{exact} of {}",
+        matched.inliers.len()
+    );
+}
+
 #[test]
 fn contradictory_input_is_an_error() {
     let (frame, context) = (frame(), StageContext::default());
@@ -331,6 +361,8 @@ fn contradictory_input_is_an_error() {
     assert!(matches!(match_with(&ownerless, 1), Err(Error::Input { .. })));
     let nowhere = levels(&[(f64::NAN, &[1])]);
     assert!(matches!(match_with(&nowhere, 1), Err(Error::Input { .. })));
+    let colored = Features { surroundings: Raster::new(9, 9, 3), ..levels(&[(0.0, &[1])]) };
+    assert!(matches!(match_with(&colored, 1), Err(Error::Input { .. })));
     let forced = BTreeSet::new();
     let input = MatchingInput {
         features: &[good],
