@@ -40,6 +40,12 @@ const TURN_FACTOR: f64 = 1.25;
 /// ... and this many more: a homography has two unknowns more to please wrong matches with.
 const TURN_MORE: usize = 15;
 
+/// Fewest matches elsewhere in depth that are believed. Beside a plane, any two tell where the epipole is and so agree; of photographs taken from one point
+/// six false ones came together at most.
+const FEWEST_ELSEWHERE: usize = 8;
+/// Fewest of them that are believed where so many are found again by what surrounds them.
+const FEWEST_CONFIRMED: usize = 3;
+
 /// A photograph of a pair.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PhotographFeatures<'a> {
@@ -217,7 +223,10 @@ pub(super) fn match_pair(
         let mut generator = context.generator("matches elsewhere", seed);
         let cameras = model.cameras([a.frame, b.frame]);
         let found = matches_elsewhere(points, &is_known, &model.b_from_a, &cameras, b.frame, &mut generator);
-        pair.elsewhere = refiner.refined(found.into_iter().map(|k| putative[k].at).collect(), in_b).into();
+        let elsewhere: Vec<PointMatch> = found.into_iter().map(|k| putative[k].at).collect();
+        if elsewhere.len() >= FEWEST_ELSEWHERE || refiner.confirmed(&elsewhere, in_b) >= FEWEST_CONFIRMED {
+            pair.elsewhere = refiner.refined(elsewhere, in_b).into();
+        }
     }
     Ok(pair)
 }

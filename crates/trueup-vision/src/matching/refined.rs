@@ -46,6 +46,15 @@ impl Refiner<'_> {
         matches.into_iter().map(refined).collect()
     }
 
+    /// How many of the matches have surroundings in a that are found again in b.
+    pub(super) fn confirmed(
+        &self,
+        matches: &[PointMatch],
+        b_from_a: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
+    ) -> usize {
+        matches.iter().filter(|one| self.found_again(one, &b_from_a).is_some()).count()
+    }
+
     fn found_again(
         &self,
         one: &PointMatch,

@@ -318,6 +318,24 @@ fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
     assert_eq!((diagnostics[0].code.as_str(), &diagnostics[0].subject), ("near-duplicate", &Subject::Pair(0, 2)));
 }
 
+/// A near thing of so many points, 14 px from where the plane has it.
+#[test]
+fn a_few_matches_elsewhere_in_depth_are_not_believed() {
+    let elsewhere = |count: usize| {
+        let mut generator = generator(17);
+        let mut photographs = PhotographPair::default();
+        photographs.add_plane(&example_map(), 200, 0.3, &mut generator);
+        for k in 0..count {
+            let in_a = Vector2::new(500.0 + 17.0 * (k % 4) as f64, 250.0 + 19.0 * (k / 4) as f64);
+            photographs.add(in_a, example_map().apply(in_a) + Vector2::new(14.0, 0.0), &mut generator);
+        }
+        let matched = photographs.matched(false, &MatchingOptions::default());
+        assert!(matched.inliers.len() >= 200);
+        matched.elsewhere.len()
+    };
+    assert_eq!([elsewhere(0), elsewhere(7), elsewhere(12)], [0, 0, 12]);
+}
+
 /// Waves that the map carries from one photograph into the other; features are off by up to 0.6 px along each axis.
 #[test]
 fn matches_are_placed_by_what_surrounds_them() {
