@@ -6,6 +6,7 @@
 
 pub mod features;
 pub mod frames;
+mod gray;
 pub mod line_matching;
 pub mod lines;
 pub mod matching;

@@ -30,8 +30,8 @@ pub struct MatchedPair<'a> {
 }
 
 /// Measures how far apart matched points land, each way from one to the other as long as it is in the photographs there: the root mean
-/// square of its lengths in the two. That counts a way across the stretched rows beside a sphere's pole as what it shows. `None` without a match that lies in unfolded places of both. On a full turn whose ends
-/// meet, distances are taken modulo its `period`.
+/// square of its lengths in the two. That counts a way across the stretched rows beside a sphere's pole as what it shows. `None` without a
+/// match that lies in unfolded places of both. On a full turn whose ends meet, distances are taken modulo its `period`.
 pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reprojection> {
     let mut distances: Vec<f64> =
         pairs.iter().flat_map(|pair| match_distances(pair, period)).filter(|distance| distance.is_finite()).collect();
@@ -52,11 +52,10 @@ pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reproj
 /// How far apart each match of a pair lands, in the order of the matches, measured as by [`reprojection`]; not finite where
 /// that is no number.
 pub fn match_distances(pair: &MatchedPair, period: Option<f64>) -> impl Iterator<Item = f64> {
-    let own_square = |mesh: &GridMesh, point: [f64; 2], way: Vector2<f64>| squared_length_in(mesh, point.into(), way);
-    pair.matches
-        .iter()
-        .zip(panorama_ways(pair, period))
-        .map(move |(one, way)| ((own_square(pair.a, one.in_a, way) + own_square(pair.b, one.in_b, way)) / 2.0).sqrt())
+    pair.matches.iter().zip(panorama_ways(pair, period)).map(move |(one, way)| {
+        ((squared_length_in(pair.a, one.in_a.into(), way) + squared_length_in(pair.b, one.in_b.into(), way)) / 2.0)
+            .sqrt()
+    })
 }
 
 /// How far apart each match of a pair lands, in the order of the matches, in pixels of the panorama; not finite where that is no number.

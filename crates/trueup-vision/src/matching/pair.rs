@@ -219,13 +219,13 @@ pub(super) fn match_pair(
         let (inliers, is_known) = joined.all_inliers(&mut generator);
         let refiner = Refiner { a: &a.features.surroundings, b: &b.features.surroundings };
         let in_b = |point| model.in_b(point);
-        pair.inliers = refiner.refined(inliers, in_b).into();
+        pair.inliers = refiner.refined(inliers, in_b).matches.into();
         let mut generator = context.generator("matches elsewhere", seed);
         let cameras = model.cameras([a.frame, b.frame]);
         let found = matches_elsewhere(points, &is_known, &model.b_from_a, &cameras, b.frame, &mut generator);
-        let elsewhere: Vec<PointMatch> = found.into_iter().map(|k| putative[k].at).collect();
-        if elsewhere.len() >= FEWEST_ELSEWHERE || refiner.confirmed(&elsewhere, in_b) >= FEWEST_CONFIRMED {
-            pair.elsewhere = refiner.refined(elsewhere, in_b).into();
+        let elsewhere = refiner.refined(found.into_iter().map(|k| putative[k].at).collect(), in_b);
+        if elsewhere.matches.len() >= FEWEST_ELSEWHERE || elsewhere.found_again >= FEWEST_CONFIRMED {
+            pair.elsewhere = elsewhere.matches.into();
         }
     }
     Ok(pair)

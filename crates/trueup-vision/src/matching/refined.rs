@@ -6,6 +6,8 @@ use nalgebra::{Matrix2, Vector2};
 use trueup_core::matches::PointMatch;
 use trueup_core::raster::Raster;
 
+use crate::gray::gray_at;
+
 /// Radius of the window, in pixels of photograph a.
 const RADIUS_PX: i32 = 5;
 /// Deviation of the window's Gaussian weights, in pixels of photograph a.
@@ -27,6 +29,14 @@ pub(super) struct Refiner<'a> {
     pub(super) b: &'a Raster<u8>,
 }
 
+/// Matches that were placed anew.
+pub(super) struct Refined {
+    /// All of them, in their order.
+    pub(super) matches: Vec<PointMatch>,
+    /// How many have surroundings in a that were found again in b; the others are where they were.
+    pub(super) found_again: usize,
+}
+
 impl Refiner<'_> {
     /// The matches, those in b where what surrounds them in a is found again, if that is surer than what features tell. `b_from_a` tells the shape of
     /// the surroundings; where matches lie, these tell better.
@@ -38,21 +48,15 @@ impl Refiner<'_> {
         &self,
         matches: Vec<PointMatch>,
         b_from_a: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
-    ) -> Vec<PointMatch> {
-        let refined = |one: PointMatch| match self.found_again(&one, &b_from_a) {
-            Some(place) => PointMatch { in_b: place.into(), ..one },
-            None => one,
-        };
-        matches.into_iter().map(refined).collect()
-    }
-
-    /// How many of the matches have surroundings in a that are found again in b.
-    pub(super) fn confirmed(
-        &self,
-        matches: &[PointMatch],
-        b_from_a: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
-    ) -> usize {
-        matches.iter().filter(|one| self.found_again(one, &b_from_a).is_some()).count()
+    ) -> Refined {
+        let mut refined = Refined { matches, found_again: 0 };
+        for one in &mut refined.matches {
+            if let Some(place) = self.found_again(one, &b_from_a) {
+                one.in_b = place.into();
+                refined.found_again += 1;
+            }
+        }
+        refined
     }
 
     fn found_again(
@@ -133,8 +137,8 @@ impl Window {
         if !(is_inside(0) && is_inside(1)) {
             return None;
         }
-        let mut values: Vec<f64> =
-            WINDOW.points.iter().map(|point| value_at(picture, place + shape * point.offset)).collect();
+        let value = |point: &WindowPoint| gray_at(picture, place + shape * point.offset);
+        let mut values = WINDOW.points.iter().map(value).collect::<Option<Vec<f64>>>()?;
         let mean: f64 = values.iter().zip(WINDOW.points.iter()).map(|(value, point)| point.weight * value).sum();
         values.iter_mut().for_each(|value| *value -= mean);
         let contrast = values.iter().zip(WINDOW.points.iter()).map(|(value, point)| point.weight * value * value).sum();
@@ -145,20 +149,6 @@ impl Window {
         let both = self.values.iter().zip(&other.values).zip(WINDOW.points.iter());
         both.map(|((one, other), point)| point.weight * one * other).sum()
     }
-}
-
-/// Between four pixels of a picture, which must surround the place.
-fn value_at(picture: &Raster<u8>, place: Vector2<f64>) -> f64 {
-    let (x, y) = (place.x - 0.5, place.y - 0.5);
-    // The casts saturate; at the very border, rounding may lead out by less than is seen.
-    let (left, above) = ((x as usize).min(picture.width() - 2), (y as usize).min(picture.height() - 2));
-    let (right, below) = (x - left as f64, y - above as f64);
-    let along = |y: usize| {
-        let row = &picture.row(y)[left..left + 2];
-        f64::from(row[0]) + right * (f64::from(row[1]) - f64::from(row[0]))
-    };
-    let (upper, lower) = (along(above), along(above + 1));
-    upper + below * (lower - upper)
 }
 
 /// The window in photograph a, and how it changes where it moves.
@@ -247,7 +237,7 @@ mod tests {
             let off = Vector2::new(f64::from(k % 5) - 2.0, f64::from(k % 3) - 1.0) * 0.45;
             let truth = b_from_a(in_a);
             let one = PointMatch { in_a: in_a.into(), in_b: (truth + off).into() };
-            let found = refiner.refined(vec![one], |point| Some(b_from_a(point))).remove(0);
+            let found = refiner.refined(vec![one], |point| Some(b_from_a(point))).matches.remove(0);
             assert_eq!(found.in_a, one.in_a);
             if found != one {
                 moved += 1;
@@ -276,12 +266,12 @@ mod tests {
             (&waves, &other, middle),
         ] {
             let one = PointMatch { in_a, in_b: [in_a[0] + 0.6, in_a[1] - 0.3] };
-            assert_eq!(Refiner { a, b }.refined(vec![one], Some), [one]);
+            assert_eq!(Refiner { a, b }.refined(vec![one], Some).matches, [one]);
         }
         let one = PointMatch { in_a: middle, in_b: [f64::NAN, 3.0] };
-        let kept = Refiner { a: &waves, b: &waves }.refined(vec![one], Some).remove(0);
+        let kept = Refiner { a: &waves, b: &waves }.refined(vec![one], Some).matches.remove(0);
         assert!(kept.in_b[0].is_nan());
         let one = PointMatch { in_a: middle, in_b: middle };
-        assert_eq!(Refiner { a: &waves, b: &waves }.refined(vec![one], |_| None), [one]);
+        assert_eq!(Refiner { a: &waves, b: &waves }.refined(vec![one], |_| None).matches, [one]);
     }
 }

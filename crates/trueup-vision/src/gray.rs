@@ -1,0 +1,17 @@
+//! Gray pictures, read between their pixels.
+
+use nalgebra::Vector2;
+use trueup_core::raster::Raster;
+
+/// Bilinear gray value; `None` outside the outermost pixels' centers.
+pub(crate) fn gray_at(gray: &Raster<u8>, point: Vector2<f64>) -> Option<f64> {
+    let (x, y) = (point.x - 0.5, point.y - 0.5);
+    let inside = x >= 0.0 && y >= 0.0 && x < gray.width() as f64 - 1.0 && y < gray.height() as f64 - 1.0;
+    if !inside {
+        return None;
+    }
+    let (column, row) = (x as usize, y as usize);
+    let (u, v) = (x - column as f64, y - row as f64);
+    let at = |dx: usize, dy: usize| f64::from(gray.pixel(column + dx, row + dy)[0]);
+    Some((at(0, 0) * (1.0 - u) + at(1, 0) * u) * (1.0 - v) + (at(0, 1) * (1.0 - u) + at(1, 1) * u) * v)
+}
