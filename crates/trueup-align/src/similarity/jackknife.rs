@@ -12,6 +12,8 @@ use super::joint::{LineVote, Refinement};
 const MAX_GROUPS: usize = 8;
 /// A deviation estimated from k groups is too small for Student's t by about this over k - 1 (one standard deviation).
 const FEW_GROUPS: f64 = 0.66;
+/// A covariance has the shape that so many more groups would give it that scatter alike all round. Reasoned: the two axes of a vertical, a group each.
+const SHAPELESS_GROUPS: f64 = 2.0;
 
 /// Standard deviation, about any level axis, of what all lines of a scene err by alike, degrees. Fitted on 100 photographs of rendered rooms, whose level
 /// is exact (which need none), and 267 cut from panoramas: the smallest hundredth with which the 95 % interval holds the truth of 95 % of either.
@@ -30,31 +32,59 @@ fn sector(frame: &Matrix3<f64>, vertical: usize, toward: &Vector3<f64>) -> usize
     ((longitude + std::f64::consts::PI) / SECTOR_DEG.to_radians()) as usize
 }
 
-/// Standard deviation in radians of the vertical, column `vertical` of a frame that a refinement found, by what is left without one sector of the
+/// How far an axis of a frame depends on what is asked of the scene.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AxisScatter {
+    /// Covariance of the axis, rad^2; infinite on the diagonal where nothing tells.
+    pub covariance: Matrix3<f64>,
+}
+
+impl AxisScatter {
+    /// Of a covariance that `groups` tell, two or more: it grows as Student's t does, and the fewer they are, the less it is believed that the axis is
+    /// surer one way than the other.
+    pub(super) fn of_groups(covariance: &Matrix3<f64>, axis: &Vector3<f64>, groups: usize) -> Self {
+        let free = groups as f64 - 1.0;
+        let few = 1.0 + FEW_GROUPS / free;
+        let about = (Matrix3::identity() - axis * axis.transpose()) * (0.5 * covariance.trace());
+        let shaped = (covariance * free + about * SHAPELESS_GROUPS) / (free + SHAPELESS_GROUPS);
+        Self { covariance: shaped * few.powi(2) }
+    }
+
+    /// Of an axis of which nothing is known.
+    fn unknown() -> Self {
+        Self { covariance: Matrix3::from_diagonal_element(f64::INFINITY) }
+    }
+
+    /// Standard deviation in radians, about both of its tangents together.
+    pub(super) fn deviation(&self) -> f64 {
+        self.covariance.trace().sqrt()
+    }
+}
+
+/// Scatter of the vertical, column `vertical` of a frame that a refinement found, by what is left without one sector of the
 /// scene each; `None` with fewer than [`MIN_SECTORS`]. One thing that several photographs show is in the lines of all of them: leaving out
 /// photographs does not show that all rests on it.
-pub(super) fn deviation_by_sectors(vote: &LineVote, refinement: Refinement<'_>, vertical: usize) -> Option<f64> {
+pub(super) fn scatter_by_sectors(vote: &LineVote, refinement: Refinement<'_>, vertical: usize) -> Option<AxisScatter> {
     let frames = without_each_sector(vote, refinement, vertical);
-    (frames.len() >= MIN_SECTORS).then(|| axis_deviation(&frames, vertical))
+    (frames.len() >= MIN_SECTORS).then(|| axis_scatter(&frames, vertical))
 }
 
-/// Standard deviation in radians, by a delete-a-group jackknife over the photographs, of each axis (a column) of a
-/// frame that a refinement found, from which it starts again: how much it depends on which photographs are asked. Infinite for a
-/// single photograph.
+/// Scatter, by a delete-a-group jackknife over the photographs, of an axis (a column) of a frame that a refinement found, from which it starts again: how
+/// much it depends on which photographs are asked. Unknown of a single photograph.
 ///
 /// Photographs, not segments, are left out, because the segments of one photograph err together.
-pub(super) fn axis_deviations(vote: &LineVote, refinement: Refinement<'_>) -> [f64; 3] {
+pub(super) fn scatter_by_photographs(vote: &LineVote, refinement: Refinement<'_>, axis: usize) -> AxisScatter {
     let frames = without_some_photographs(vote, refinement);
     if frames.len() < 2 {
-        return [f64::INFINITY; 3];
+        return AxisScatter::unknown();
     }
-    std::array::from_fn(|axis| axis_deviation(&frames, axis))
+    axis_scatter(&frames, axis)
 }
 
-/// Standard deviation in radians of an axis, by frames found without one group each, of which there are two or more.
-fn axis_deviation(frames: &[Matrix3<f64>], axis: usize) -> f64 {
-    let few = 1.0 + FEW_GROUPS / (frames.len() as f64 - 1.0);
-    few * axis_covariance(frames, axis).trace().sqrt()
+/// Scatter of an axis, by frames found without one group each, of which there are two or more.
+fn axis_scatter(frames: &[Matrix3<f64>], axis: usize) -> AxisScatter {
+    let mean: Vector3<f64> = frames.iter().map(|frame| frame.column(axis).into_owned()).sum();
+    AxisScatter::of_groups(&axis_covariance(frames, axis), &mean.normalize(), frames.len())
 }
 
 /// Covariance of an axis, rad^2, by frames found without one group each, of which there are two or more; too small of few groups, as Student's t knows.
@@ -102,8 +132,19 @@ mod tests {
     fn the_jackknife_of_known_frames() {
         let frames = [rotation_about_y(0.01), rotation_about_y(-0.01), rotation_about_z(0.01), rotation_about_z(-0.01)];
         let few = 1.22;
-        assert!((axis_deviation(&frames, 0) / (few * 3e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
-        assert!((axis_deviation(&frames, 2) / (few * 1.5e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
+        assert!((axis_scatter(&frames, 0).deviation() / (few * 3e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
+        assert!((axis_scatter(&frames, 2).deviation() / (few * 1.5e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
+    }
+
+    /// By hand: of variances 8 and 0 about x and z, mean 4, three groups have two degrees of freedom: (2 x 8 + 2 x 4) / 4 = 6 and (2 x 0 + 2 x 4) / 4 = 2,
+    /// times (1 + 0.66 / 2)^2 = 1.7689; of a thousand groups nearly 8 and 0.
+    #[test]
+    fn few_groups_tell_little_of_a_scatters_shape() {
+        let covariance = Matrix3::from_diagonal(&Vector3::new(8e-4, 0.0, 0.0));
+        let few = AxisScatter::of_groups(&covariance, &Vector3::y(), 3).covariance;
+        let expected = Matrix3::from_diagonal(&Vector3::new(6e-4, 0.0, 2e-4)) * 1.7689;
+        assert!((few - expected).norm() < 1e-12, "{few}");
+        assert!((AxisScatter::of_groups(&covariance, &Vector3::y(), 1000).covariance - covariance).norm() < 3e-6);
     }
 
     /// By hand: sectors are counted from half a turn to the left of the axis after the next one, toward the next.

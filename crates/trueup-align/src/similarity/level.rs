@@ -224,21 +224,25 @@ impl<'a> CameraLevel<'a> {
         if self.says.iter().any(contradicts) { self.without_horizon() } else { self.clone() }
     }
 
-    /// The vertical with what lines say of it, which deviates by `deviation` radians in `photographs` photographs, weighed in; and
+    /// The vertical with what lines in `photographs` photographs say of it, whose covariance is `covariance`, rad^2, weighed in; and
     /// what told of it, the lines first.
     pub(super) fn with_lines(
         &self,
         lines: &Vector3<f64>,
-        deviation: f64,
+        covariance: &Matrix3<f64>,
         photographs: usize,
     ) -> (Vector3<f64>, Vec<LevelEvidence>) {
-        let deviation = deviation.clamp(LEAST_DEVIATION, f64::INFINITY);
+        let basis = tangent_basis(lines);
+        let least = Matrix2::identity() * LEAST_DEVIATION.powi(2);
+        // What is infinite tells nothing.
+        let across = (basis.tr_mul(&(covariance * basis)) + least).try_inverse();
+        let across = across.filter(|across| across.iter().all(|part| part.is_finite())).unwrap_or_default();
         let lines_say = Say {
             source: LevelSource::Lines,
             photographs,
             down: *lines,
             moment: Matrix3::zeros(),
-            information: Matrix3::identity() * deviation.powi(-2),
+            information: basis * across * basis.transpose(),
         };
         let says: Vec<Say> = std::iter::once(lines_say).chain(self.says.iter().copied()).collect();
         let down = combined(&says);
@@ -318,6 +322,11 @@ mod tests {
         (0..4).map(|quarter| rotation_about_z(if quarter % 2 == 0 { roll } else { -roll }) * turn(quarter)).collect()
     }
 
+    /// The covariance of a vertical that deviates alike all round.
+    fn alike(deviation: f64) -> Matrix3<f64> {
+        Matrix3::from_diagonal_element(deviation.powi(2))
+    }
+
     fn gravity(down: Vector3<f64>, deviation: f64) -> Option<MeanGravity> {
         Some(MeanGravity { down, deviation, photographs: 4 })
     }
@@ -344,7 +353,7 @@ mod tests {
         let tilted = rotation_about_x(0.02) * Vector3::y();
         let level = CameraLevel::new(&rotations, 0.0, gravity(tilted, 0.002));
         // The cameras, sure to a degree, move gravity a little; what remains lies between.
-        let (down, evidence) = level.with_lines(&Vector3::y(), 0.001, 4);
+        let (down, evidence) = level.with_lines(&Vector3::y(), &alike(0.001), 4);
         let cameras = CameraLevel::new(&rotations, 0.0, None).deviation().powi(-2);
         let (lines, gravity) = (1e6, 0.25e6);
         let expected = 0.02 * gravity / (gravity + lines + cameras);
@@ -355,6 +364,21 @@ mod tests {
             assert!((share - expected).abs() < 1e-3, "{shares:?}");
         }
         assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+
+    /// Lines sure to 0.001 one way and to 1 the other, against gravity sure to 0.001 that is 0.002 off both ways: halfway the one way, all of it the other.
+    /// The cameras, sure to a degree, change either by less than a hundredth.
+    #[test]
+    fn lines_are_heard_as_far_as_they_tell() {
+        let rotations = all_round(0.0);
+        let recorded = Vector3::new(0.002, 1.0, 0.002).normalize();
+        let level = CameraLevel::new(&rotations, 0.0, gravity(recorded, 0.001));
+        let covariance = Matrix3::from_diagonal(&Vector3::new(1e-6, 0.0, 1.0));
+        let (down, evidence) = level.with_lines(&Vector3::y(), &covariance, 4);
+        assert!((down.x - 0.001).abs() < 1e-5 && (down.z - 0.002).abs() < 2e-5, "{down}");
+        assert!((evidence[0].deviation - 1.0).abs() < 1e-6, "{}", evidence[0].deviation);
+        let (unheard, _) = level.with_lines(&Vector3::x(), &alike(f64::INFINITY), 4);
+        assert!(unheard.angle(&level.down) < 1e-9, "{unheard}");
     }
 
     /// A telephone laid on its side for every photograph: its cameras expect another level, gravity knows.
@@ -375,7 +399,7 @@ mod tests {
         let rotations = all_round(0.0);
         let level = CameraLevel::new(&rotations, 0.0, None);
         let lines = rotation_about_x(14_f64.to_radians()) * Vector3::y();
-        let down = |deviation_deg: f64| level.with_lines(&lines, deviation_deg.to_radians(), 4).0;
+        let down = |deviation_deg: f64| level.with_lines(&lines, &alike(deviation_deg.to_radians()), 4).0;
         let from_cameras = |deviation_deg: f64| down(deviation_deg).angle(&Vector3::y()).to_degrees();
         assert!(from_cameras(10.0) < 0.5, "{}", from_cameras(10.0));
         assert!(from_cameras(3.0) > 13.0, "{}", from_cameras(3.0));
@@ -410,7 +434,7 @@ mod tests {
         let with = |angle: f64| {
             let down = rotation_about_x(angle) * Vector3::y();
             let level = CameraLevel::new(&rotations, 0.0, None).with_horizon(&far_horizon(down, 0.004));
-            level.without_contradicted_horizon(&Vector3::y(), 0.002).with_lines(&Vector3::y(), 0.002, 4)
+            level.without_contradicted_horizon(&Vector3::y(), 0.002).with_lines(&Vector3::y(), &alike(0.002), 4)
         };
         let (down, evidence) = with(0.01);
         assert!((down.angle(&Vector3::y()) - 0.002).abs() < 1e-4, "{}", down.angle(&Vector3::y()));
@@ -418,7 +442,7 @@ mod tests {
         // Heard all the same, it counts for a fifth as before.
         let contradicted = rotation_about_x(0.05) * Vector3::y();
         let level = CameraLevel::new(&rotations, 0.0, None).with_horizon(&far_horizon(contradicted, 0.004));
-        let (down, evidence) = level.with_lines(&Vector3::y(), 0.002, 4);
+        let (down, evidence) = level.with_lines(&Vector3::y(), &alike(0.002), 4);
         assert!((down.angle(&Vector3::y()) - 0.01).abs() < 5e-4, "{}", down.angle(&Vector3::y()));
         assert_eq!(evidence.len(), 3);
         let (down, evidence) = with(0.05);
@@ -442,7 +466,7 @@ mod tests {
     fn lines_that_do_not_scatter_are_believed() {
         let rotations = all_round(0.0);
         let lines = rotation_about_x(0.02) * Vector3::y();
-        let (down, evidence) = CameraLevel::new(&rotations, PITCH_PRIOR, None).with_lines(&lines, 0.0, 4);
+        let (down, evidence) = CameraLevel::new(&rotations, PITCH_PRIOR, None).with_lines(&lines, &alike(0.0), 4);
         assert!(down.angle(&lines) < 1e-9, "{down}");
         assert!(evidence[0].share > 0.999, "{evidence:?}");
     }

@@ -10,7 +10,7 @@ use super::dominant::{Dominant, dominant_frame};
 use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrames, search_frames};
 use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
-use super::jackknife::{axis_deviations, deviation_by_sectors};
+use super::jackknife::{AxisScatter, scatter_by_photographs, scatter_by_sectors};
 use super::joint::{self, AxisWeights, LineVote, Refinement};
 use super::level::{CameraLevel, mean_square_roll};
 use super::options::{GateMode, SimilarityOptions};
@@ -242,8 +242,8 @@ impl<'a> SceneDirections<'a> {
         if joint {
             let vertical = column_near(&frame, &down);
             let refinement = Refinement { start: &frame, axes_used: 3, axis_weights: &axis_weights };
-            let deviation = self.deviation(refinement, vertical, asked.as_ref(), guidance.pooled);
-            down = self.weighed(&down, deviation, guidance)?;
+            let scatter = self.scatter(refinement, vertical, asked.as_ref(), guidance.pooled);
+            down = self.weighed(&down, &scatter, guidance)?;
         }
         guidance.spread = reconciled.map(|found| VerticalSpread::about(&down, &found));
         guidance.dominant = Some(rows_of(&(turn_between(&self.vertical(&frame), &down) * frame)));
@@ -257,34 +257,35 @@ impl<'a> SceneDirections<'a> {
         Ok(self.solve(&down, &own, rotations, guidance))
     }
 
-    /// Standard deviation in radians of the vertical, column `vertical` of a frame that lines refined, by asking different photographs; or without one
+    /// Scatter of the vertical, column `vertical` of a frame that lines refined, by asking different photographs; or without one
     /// sector of the scene each, where that is beyond what may guide: then all photographs know it from one and the same thing. What is
     /// `reconciled` knows that already. Of a frame of all lines together (`pooled`) the larger counts in any case: single photographs agree on nothing.
-    fn deviation(
+    fn scatter(
         &self,
         refinement: Refinement<'_>,
         vertical: usize,
         reconciled: Option<&Reconciled>,
         pooled: bool,
-    ) -> f64 {
-        let by_photographs = axis_deviations(&self.vote, refinement)[vertical];
+    ) -> AxisScatter {
+        let by_photographs = scatter_by_photographs(&self.vote, refinement, vertical);
         let by_sectors = match reconciled {
-            Some(found) => Some(found.covariance.trace().sqrt()),
-            None => deviation_by_sectors(&self.vote, refinement, vertical),
+            Some(found) => Some(AxisScatter { covariance: found.covariance }),
+            None => scatter_by_sectors(&self.vote, refinement, vertical),
         };
-        let counts = |deviation: &f64| pooled || *deviation > MAX_GUIDING_DEVIATION_DEG.to_radians();
-        let too_wide = by_sectors.filter(counts);
-        too_wide.map_or(by_photographs, |by_sectors| by_sectors.max(by_photographs))
+        let wider = |scatter: &AxisScatter| scatter.deviation() > by_photographs.deviation();
+        let counts = |scatter: &AxisScatter| pooled || scatter.deviation() > MAX_GUIDING_DEVIATION_DEG.to_radians();
+        by_sectors.filter(|scatter| counts(scatter) && wider(scatter)).unwrap_or(by_photographs)
     }
 
     /// The vertical of lines weighed against what else is known of it; an error with that vertical if lines do not guide it, with the
-    /// failed clause. `deviation` is the lines', in radians, by asking different photographs.
+    /// failed clause. `scatter` is the lines', by asking different photographs.
     fn weighed(
         &self,
         lines: &Vector3<f64>,
-        deviation: f64,
+        scatter: &AxisScatter,
         guidance: &mut Guidance,
     ) -> std::result::Result<Vector3<f64>, Vector3<f64>> {
+        let deviation = scatter.deviation();
         guidance.vertical_deviation = Some(deviation).filter(|deviation| deviation.is_finite());
         if self.options.gate == GateMode::Paper {
             return Ok(*lines);
@@ -313,14 +314,14 @@ impl<'a> SceneDirections<'a> {
         // Also of photographs whose own directions do not agree, lines may.
         let telling = self.vote.support(lines, joint::TOLERANCE_DEG.to_radians()).photographs;
         let believed = self.level.without_contradicted_horizon(lines, deviation);
-        let (down, evidence) = believed.with_lines(lines, deviation, telling);
+        let (down, evidence) = believed.with_lines(lines, &scatter.covariance, telling);
         let outweigh = evidence.first().is_some_and(|lines| lines.share >= GUIDING_SHARE);
         if outweigh && degrees <= MAX_GUIDING_DEVIATION_DEG {
             guidance.level = evidence;
             return Ok(down);
         }
         // A horizon that they contradict counts beside lines that do not guide.
-        let (down, evidence) = self.level.with_lines(lines, deviation, telling);
+        let (down, evidence) = self.level.with_lines(lines, &scatter.covariance, telling);
         guidance.level = evidence;
         guidance.pooled = false;
         let limit = match outweigh {
@@ -364,9 +365,9 @@ impl<'a> SceneDirections<'a> {
         let (first, second) = orthonormal_complement(&peak.down);
         let frame = Matrix3::from_columns(&[peak.down, first, second]);
         let refinement = Refinement { start: &frame, axes_used: 1, axis_weights: &[1.0; 3] };
-        let deviation = self.deviation(refinement, 0, None, false);
+        let scatter = self.scatter(refinement, 0, None, false);
         let refused = guidance.clone();
-        let Ok(down) = self.weighed(&peak.down, deviation, guidance) else {
+        let Ok(down) = self.weighed(&peak.down, &scatter, guidance) else {
             *guidance = refused;
             return None;
         };
