@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::band::Band;
 use super::options::SeamOptions;
-use super::shading::{FRACTION, slopes};
+use super::shading::{FRACTION, Shading, shading};
 use super::softness::Softness;
-use crate::small_views::{CLIPPED, Depths, IGNORED, KEPT, PARTLY, SmallPixel, SmallView, WHOLLY, luma};
+use crate::small_views::{CLIPPED, Depths, IGNORED, KEPT, PARTLY, SmallPixel, SmallView, WHOLE_LACK, WHOLLY, luma};
 
 /// Cost of a seam for its length alone, gray levels of difference. Higher makes seams shorter.
 const LENGTH: f64 = 2.0;
@@ -27,6 +27,11 @@ const AGAINST_WISHES: i32 = 1 << 16;
 /// a photograph there is no room to blend.
 const UNSEEN: i32 = MAX_DIFFERENCE;
 
+/// A step between photographs that there is no room to blend counts as a slope of the shading by this part of it.
+const SLOPES_PER_STEP: i32 = 2;
+/// Steps that a short transition hides, gray levels.
+const HIDDEN_STEP: i16 = 8;
+
 /// Largest difference of a pixel; that of three photographs obeys the triangle inequality with it, too.
 const MAX_DIFFERENCE: i32 = 128 * UNIT;
 
@@ -39,8 +44,11 @@ pub(super) struct SeamEnergy<'a> {
     pub(super) views: &'a [SmallView],
     /// Horizontal and vertical differences of the luma, for every pixel of every view that is prepared.
     gradients: Vec<Vec<[i16; 2]>>,
-    /// Slopes of the shading, for every pixel of every view that is prepared; empty if they do not count.
-    slopes: Vec<Vec<[i16; 2]>>,
+    /// Shading of every pixel of every view that is prepared; empty if it does not count.
+    shading: Vec<Vec<Shading>>,
+    /// For every canvas pixel that is prepared: by how much more than [`HIDDEN_STEP`] the photographs' mean brightness lies apart there, in [`FRACTION`]s
+    /// of a level. Empty if it does not count.
+    spread: Vec<i16>,
     depths: Vec<Depths>,
     softness: &'a [Softness],
     /// How often the canvas that the softness is of was halved.
@@ -96,7 +104,8 @@ impl<'a> SeamEnergy<'a> {
             turn,
             views,
             gradients: Vec::new(),
-            slopes: Vec::new(),
+            shading: Vec::new(),
+            spread: Vec::new(),
             depths: views.par_iter().map(SmallView::depths).collect(),
             softness,
             halvings,
@@ -118,8 +127,31 @@ impl<'a> SeamEnergy<'a> {
         let views = self.views;
         self.gradients = views.par_iter().map(|view| gradients(view, wanted)).collect();
         if self.shading_weight > 0 {
-            self.slopes = views.par_iter().map(|view| slopes(view, wanted)).collect();
+            self.shading = views.par_iter().map(|view| shading(view, wanted)).collect();
+            self.spread = self.spread();
         }
+    }
+
+    /// See [`Self::spread`], the field.
+    fn spread(&self) -> Vec<i16> {
+        let hidden = HIDDEN_STEP * FRACTION as i16;
+        let mut spread = vec![0; self.width * self.height];
+        spread.par_chunks_exact_mut(self.width.max(1)).enumerate().for_each(|(y, spread)| {
+            let mut least = vec![i16::MAX; self.width];
+            let mut most = vec![0_i16; self.width];
+            for (view, shading) in self.views.iter().zip(&self.shading).filter(|(view, _)| view.rows.contains(&y)) {
+                let row = &shading[(y - view.rows.start) * view.columns.len()..][..view.columns.len()];
+                for (x, mean) in view.columns.clone().zip(row).filter_map(|(x, one)| Some((x, one.mean?))) {
+                    let x = self.column(x);
+                    least[x] = least[x].min(mean);
+                    most[x] = most[x].max(mean);
+                }
+            }
+            for (spread, (least, most)) in spread.iter_mut().zip(least.iter().zip(&most)) {
+                *spread = most.saturating_sub(*least).saturating_sub(hidden).max(0);
+            }
+        });
+        spread
     }
 
     /// The canvas column of a column that may lie in the next turn.
@@ -212,10 +244,16 @@ impl<'a> SeamEnergy<'a> {
         let (g, h) = (self.gradients[a][i], self.gradients[b][j]);
         let gradient: i32 = (0..2).map(|axis| i32::from(g[axis] - h[axis]).abs()).sum();
         let mut difference = color * UNIT / 3 + gradient * self.gradient_weight / 2;
-        if !self.slopes.is_empty() {
-            let (g, h) = (self.slopes[a][i], self.slopes[b][j]);
+        if !self.shading.is_empty() {
+            let (g, h) = (self.shading[a][i].slope, self.shading[b][j].slope);
             let slope: i32 = (0..2).map(|axis| (i32::from(g[axis]) - i32::from(h[axis])).abs()).sum();
             difference += slope * self.shading_weight / FRACTION;
+            let lack = self.depths[a].lack_of_room(i) + self.depths[b].lack_of_room(j);
+            if lack > 0 {
+                // Of all photographs, not of these two: so three obey the triangle inequality.
+                let apart = i32::from(self.spread[y * self.width + self.column(x)]) * lack / WHOLE_LACK;
+                difference += apart * self.shading_weight / (FRACTION * SLOPES_PER_STEP);
+            }
         }
         difference.min(MAX_DIFFERENCE)
     }

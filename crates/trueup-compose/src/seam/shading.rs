@@ -9,14 +9,22 @@ pub(super) const FRACTION: i32 = 64;
 /// Pixels of the seams' canvas over which shading is averaged to either side; half of it across.
 const SHADING_REACH: usize = 4;
 
-/// For every pixel of a view that is `wanted`, across and down: the mean brightness on one side minus that on the other, in
-/// [`FRACTION`]s of a gray level; 0 where one side shows nothing, and elsewhere.
+/// How bright a view is around one of its pixels, and how that changes there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Shading {
+    /// Across and down: the mean brightness on one side minus that on the other, in [`FRACTION`]s of a gray level; 0 where one side shows nothing.
+    pub(super) slope: [i16; 2],
+    /// The mean brightness around the pixel, in [`FRACTION`]s of a gray level; `None` where nothing is covered.
+    pub(super) mean: Option<i16>,
+}
+
+/// The shading of every pixel of a view that is `wanted`; none elsewhere.
 ///
 /// The sides are half of [`SHADING_REACH`] pixels deep and reach that many pixels to either side along the line between
 /// them. Where two photographs differ in this, a panorama cannot go over from one to the other without a slope that
 /// neither shows, however wide the transition: it is what the eye takes for a seam in skies and on walls, while differences
 /// of single pixels have both signs along a seam and mean little there.
-pub(super) fn slopes(view: &SmallView, wanted: &Band) -> Vec<[i16; 2]> {
+pub(super) fn shading(view: &SmallView, wanted: &Band) -> Vec<Shading> {
     let reach = SHADING_REACH;
     let (width, height) = (view.columns.len(), view.rows.len());
     let sums = Sums::new(view);
@@ -26,17 +34,21 @@ pub(super) fn slopes(view: &SmallView, wanted: &Band) -> Vec<[i16; 2]> {
         (Some(first), Some(second)) => (second - first) as i16,
         _ => 0,
     };
-    let mut out = vec![[0; 2]; width * height];
+    let mut out = vec![Shading::default(); width * height];
     for (y, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
         let along_y = [y.saturating_sub(reach), (y + reach + 1).min(height)];
         let (above, below) = ([y.saturating_sub(deep), y], [y + 1, (y + 1 + deep).min(height)]);
         for x in wanted.within(&view.columns, view.rows.start + y).map(|x| x - view.columns.start) {
             let along_x = [x.saturating_sub(reach), (x + reach + 1).min(width)];
             let (left, right) = ([x.saturating_sub(deep), x], [x + 1, (x + 1 + deep).min(width)]);
-            out[x] = [
-                slope(sums.mean(left, along_y), sums.mean(right, along_y)),
-                slope(sums.mean(along_x, above), sums.mean(along_x, below)),
-            ];
+            out[x] = Shading {
+                slope: [
+                    slope(sums.mean(left, along_y), sums.mean(right, along_y)),
+                    slope(sums.mean(along_x, above), sums.mean(along_x, below)),
+                ],
+                // 255 levels in 64ths are less than 2^15.
+                mean: sums.mean(along_x, along_y).map(|mean| mean as i16),
+            };
         }
     }
     out
@@ -107,20 +119,26 @@ mod tests {
     fn a_ramp_has_the_slope_between_the_middles_of_both_sides() {
         // Three levels a column, two a row. Sides of two pixels: their middles lie three pixels apart.
         let ramp = view(|x, y| (3 * x + 2 * y) as u8, |_, _| true);
-        let slopes = slopes(&ramp, &canvas_but(33));
-        assert_eq!(slopes[15 * 40 + 20], [9 * FRACTION as i16, 6 * FRACTION as i16]);
+        let shading = shading(&ramp, &canvas_but(33));
+        let slope = |at: usize| shading[at].slope;
+        assert_eq!(slope(15 * 40 + 20), [9 * FRACTION as i16, 6 * FRACTION as i16]);
+        assert_eq!(shading[15 * 40 + 20].mean, Some((3 * 20 + 2 * 15) * FRACTION as i16));
         // Beside the border the side that is left counts: one pixel, its middle two and a half away.
-        assert_eq!(slopes[15 * 40 + 1], [15 * FRACTION as i16 / 2, 6 * FRACTION as i16]);
-        assert_eq!(slopes[15 * 40], [0, 6 * FRACTION as i16]);
+        assert_eq!(slope(15 * 40 + 1), [15 * FRACTION as i16 / 2, 6 * FRACTION as i16]);
+        assert_eq!(slope(15 * 40), [0, 6 * FRACTION as i16]);
         // Not wanted.
-        assert_eq!(slopes[15 * 40 + 30], [0, 0]);
+        assert_eq!(shading[15 * 40 + 30], Shading::default());
     }
 
     #[test]
     fn texture_is_no_slope_and_what_is_not_covered_takes_no_part() {
         let stripes = view(|x, _| if x % 2 == 0 { 90 } else { 110 }, |_, _| true);
-        assert!(slopes(&stripes, &canvas_but(0)).iter().skip(15 * 40 + 5).take(30).all(|slope| *slope == [0, 0]));
+        let is_even = |shading: &Shading| shading.slope == [0, 0];
+        assert!(shading(&stripes, &canvas_but(0)).iter().skip(15 * 40 + 5).take(30).all(is_even));
         let half = view(|x, _| if x < 20 { 100 } else { 0 }, |x, _| x < 20);
-        assert!(slopes(&half, &canvas_but(0)).iter().all(|slope| *slope == [0, 0]));
+        let shading = shading(&half, &canvas_but(0));
+        assert!(shading.iter().all(is_even));
+        let level = 100 * FRACTION as i16;
+        assert_eq!([10, 23, 30].map(|x| shading[15 * 40 + x].mean), [Some(level), Some(level), None]);
     }
 }

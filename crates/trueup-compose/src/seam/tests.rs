@@ -89,6 +89,24 @@ fn clipped_parts_are_shown_by_who_is_not_clipped() {
     assert!((30..100).all(|x| seams.labels()[5 * 120 + x] == 1));
 }
 
+/// A sky that the first photograph has white, 20 levels above the second one's, whose border lies at column 20: the deepest of its pixels are 30 from it, so
+/// that transitions want 6. Where the step counts, the second photograph is shown only from there on.
+#[test]
+fn steps_between_photographs_are_left_room() {
+    let mut clipped = view(0..100, 0..60, |_, _| 255);
+    clipped.pixels.iter_mut().for_each(|pixel| pixel[3] |= CLIPPED);
+    let gray = |level: u8| view(20..120, 0..60, move |_, _| level);
+    let first_shown = |shading_weight: f64, level: u8| {
+        let options = SeamOptions { depth_weight: 0.4, shading_weight, ..SeamOptions::default() };
+        let seams = find(&[clipped.clone(), gray(level)], [120, 60], &options);
+        (0..120).find(|x| seams.labels()[30 * 120 + x] == 1).expect("shown")
+    };
+    assert!(first_shown(0.0, 235) < 23, "{}", first_shown(0.0, 235));
+    assert!(first_shown(3.0, 235) >= 25, "{}", first_shown(3.0, 235));
+    // A step that any transition hides is none.
+    assert_eq!(first_shown(3.0, 248), first_shown(0.0, 248));
+}
+
 #[test]
 fn what_is_in_focus_is_shown() {
     // Columns of 80 and 120 levels. The first photograph, deeper by far where both show them, has them blurred in a disc.

@@ -35,7 +35,7 @@ pub(crate) use coarse_level::{CoarseLevel, RIM};
 pub(crate) use coarse_levels::{CoarseLevels, SAMPLE_BYTES};
 pub(crate) use size::{COARSE_PIXELS, small_size};
 pub use view::{CLIPPED, IGNORED, KEPT, PARTLY, SmallPixel, SmallView, WHOLLY};
-pub(crate) use view::{Depths, luma};
+pub(crate) use view::{Depths, WHOLE_LACK, luma};
 
 /// The photographs that are made small.
 #[derive(Clone, Copy)]

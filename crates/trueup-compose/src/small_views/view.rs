@@ -126,6 +126,11 @@ fn mean_of_four(four: [SmallPixel; 4]) -> SmallPixel {
     [mean(0), mean(1), mean(2), flags]
 }
 
+/// [`Depths::lack_of_room`] where there is none.
+pub(crate) const WHOLE_LACK: i32 = 256;
+/// The widest transitions reach over a tenth of a photograph's side (`render.transition`): a fifth of the way from its border to its middle.
+const ROOM_PARTS: u32 = 5;
+
 /// How deep the pixels of a view lie inside its photograph.
 #[derive(Debug)]
 pub(crate) struct Depths {
@@ -138,6 +143,14 @@ impl Depths {
     #[inline]
     pub(crate) fn at(&self, index: usize) -> u8 {
         (u64::from(self.distances[index]) * 255 / u64::from(self.largest)) as u8
+    }
+
+    /// How much of the room that a wide transition takes is missing between a pixel of the box and the border, in [`WHOLE_LACK`]s; 0 deep inside.
+    #[inline]
+    pub(crate) fn lack_of_room(&self, index: usize) -> i32 {
+        let room = (self.largest / ROOM_PARTS).max(1);
+        let missing = room.saturating_sub(self.distances[index]);
+        if missing == 0 { 0 } else { (u64::from(missing) * WHOLE_LACK as u64 / u64::from(room)) as i32 }
     }
 }
 
@@ -163,5 +176,13 @@ mod tests {
         let view = SmallView { columns: 0..5, rows: 0..5, pixels: vec![[0, 0, 0, PARTLY | WHOLLY]; 25] };
         let depths = view.depths();
         assert_eq!((depths.at(0), depths.at(6), depths.at(12)), (85, 170, 255));
+    }
+
+    /// By hand: ten pixels are the deepest, two are room; the first row lacks half of it.
+    #[test]
+    fn beside_a_border_transitions_lack_room() {
+        let view = SmallView { columns: 0..19, rows: 0..19, pixels: vec![[0, 0, 0, PARTLY | WHOLLY]; 19 * 19] };
+        let depths = view.depths();
+        assert_eq!([0, 1, 2].map(|row| depths.lack_of_room(row * 19 + 9)), [WHOLE_LACK / 2, 0, 0]);
     }
 }
