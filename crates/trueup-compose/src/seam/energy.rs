@@ -45,7 +45,7 @@ pub(super) struct SeamEnergy<'a> {
     /// Horizontal and vertical differences of the luma, for every pixel of every view that is prepared.
     gradients: Vec<Vec<[i16; 2]>>,
     /// Shading of every pixel of every view that is prepared; empty if it does not count.
-    shading: Vec<Vec<Shading>>,
+    shading: Vec<Shading>,
     /// For every canvas pixel that is prepared: by how much more than [`HIDDEN_STEP`] the photographs' mean brightness lies apart there, in [`FRACTION`]s
     /// of a level. Empty if it does not count.
     spread: Vec<i16>,
@@ -128,27 +128,31 @@ impl<'a> SeamEnergy<'a> {
         self.gradients = views.par_iter().map(|view| gradients(view, wanted)).collect();
         if self.shading_weight > 0 {
             self.shading = views.par_iter().map(|view| shading(view, wanted)).collect();
-            self.spread = self.spread();
+            self.spread = self.spread(wanted);
         }
     }
 
     /// See [`Self::spread`], the field.
-    fn spread(&self) -> Vec<i16> {
+    fn spread(&self, wanted: &Band) -> Vec<i16> {
         let hidden = HIDDEN_STEP * FRACTION as i16;
         let mut spread = vec![0; self.width * self.height];
         spread.par_chunks_exact_mut(self.width.max(1)).enumerate().for_each(|(y, spread)| {
-            let mut least = vec![i16::MAX; self.width];
-            let mut most = vec![0_i16; self.width];
+            let mut prepared = wanted.within(&(0..self.width), y);
+            let Some(first) = prepared.next() else { return };
+            let last = prepared.last().unwrap_or(first);
+            let mut range = vec![(i16::MAX, 0_i16); last + 1 - first];
             for (view, shading) in self.views.iter().zip(&self.shading).filter(|(view, _)| view.rows.contains(&y)) {
-                let row = &shading[(y - view.rows.start) * view.columns.len()..][..view.columns.len()];
-                for (x, mean) in view.columns.clone().zip(row).filter_map(|(x, one)| Some((x, one.mean?))) {
-                    let x = self.column(x);
-                    least[x] = least[x].min(mean);
-                    most[x] = most[x].max(mean);
+                let row = &shading.means[(y - view.rows.start) * view.columns.len()..][..view.columns.len()];
+                for x in wanted.within(&view.columns, y) {
+                    let mean = row[x - view.columns.start];
+                    if mean > 0 {
+                        let (least, most) = &mut range[self.column(x) - first];
+                        (*least, *most) = ((*least).min(mean), (*most).max(mean));
+                    }
                 }
             }
-            for (spread, (least, most)) in spread.iter_mut().zip(least.iter().zip(&most)) {
-                *spread = most.saturating_sub(*least).saturating_sub(hidden).max(0);
+            for (spread, (least, most)) in spread[first..].iter_mut().zip(range) {
+                *spread = most.saturating_sub(least).saturating_sub(hidden).max(0);
             }
         });
         spread
@@ -245,7 +249,7 @@ impl<'a> SeamEnergy<'a> {
         let gradient: i32 = (0..2).map(|axis| i32::from(g[axis] - h[axis]).abs()).sum();
         let mut difference = color * UNIT / 3 + gradient * self.gradient_weight / 2;
         if !self.shading.is_empty() {
-            let (g, h) = (self.shading[a][i].slope, self.shading[b][j].slope);
+            let (g, h) = (self.shading[a].slopes[i], self.shading[b].slopes[j]);
             let slope: i32 = (0..2).map(|axis| (i32::from(g[axis]) - i32::from(h[axis])).abs()).sum();
             difference += slope * self.shading_weight / FRACTION;
             let lack = self.depths[a].lack_of_room(i) + self.depths[b].lack_of_room(j);

@@ -9,13 +9,12 @@ pub(super) const FRACTION: i32 = 64;
 /// Pixels of the seams' canvas over which shading is averaged to either side; half of it across.
 const SHADING_REACH: usize = 4;
 
-/// How bright a view is around one of its pixels, and how that changes there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// How bright a view is around its pixels, and how that changes there. Where it is not wanted, zeros, which no memory need be touched for.
 pub(super) struct Shading {
     /// Across and down: the mean brightness on one side minus that on the other, in [`FRACTION`]s of a gray level; 0 where one side shows nothing.
-    pub(super) slope: [i16; 2],
-    /// The mean brightness around the pixel, in [`FRACTION`]s of a gray level; `None` where nothing is covered.
-    pub(super) mean: Option<i16>,
+    pub(super) slopes: Vec<[i16; 2]>,
+    /// One more than the mean brightness around the pixel, in [`FRACTION`]s of a gray level; 0 where nothing is covered.
+    pub(super) means: Vec<i16>,
 }
 
 /// The shading of every pixel of a view that is `wanted`; none elsewhere.
@@ -24,7 +23,7 @@ pub(super) struct Shading {
 /// them. Where two photographs differ in this, a panorama cannot go over from one to the other without a slope that
 /// neither shows, however wide the transition: it is what the eye takes for a seam in skies and on walls, while differences
 /// of single pixels have both signs along a seam and mean little there.
-pub(super) fn shading(view: &SmallView, wanted: &Band) -> Vec<Shading> {
+pub(super) fn shading(view: &SmallView, wanted: &Band) -> Shading {
     let reach = SHADING_REACH;
     let (width, height) = (view.columns.len(), view.rows.len());
     let sums = Sums::new(view);
@@ -34,24 +33,23 @@ pub(super) fn shading(view: &SmallView, wanted: &Band) -> Vec<Shading> {
         (Some(first), Some(second)) => (second - first) as i16,
         _ => 0,
     };
-    let mut out = vec![Shading::default(); width * height];
-    for (y, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
+    let (mut slopes, mut means) = (vec![[0; 2]; width * height], vec![0; width * height]);
+    let rows = slopes.chunks_exact_mut(width.max(1)).zip(means.chunks_exact_mut(width.max(1)));
+    for (y, (slopes, means)) in rows.enumerate() {
         let along_y = [y.saturating_sub(reach), (y + reach + 1).min(height)];
         let (above, below) = ([y.saturating_sub(deep), y], [y + 1, (y + 1 + deep).min(height)]);
         for x in wanted.within(&view.columns, view.rows.start + y).map(|x| x - view.columns.start) {
             let along_x = [x.saturating_sub(reach), (x + reach + 1).min(width)];
             let (left, right) = ([x.saturating_sub(deep), x], [x + 1, (x + 1 + deep).min(width)]);
-            out[x] = Shading {
-                slope: [
-                    slope(sums.mean(left, along_y), sums.mean(right, along_y)),
-                    slope(sums.mean(along_x, above), sums.mean(along_x, below)),
-                ],
-                // 255 levels in 64ths are less than 2^15.
-                mean: sums.mean(along_x, along_y).map(|mean| mean as i16),
-            };
+            slopes[x] = [
+                slope(sums.mean(left, along_y), sums.mean(right, along_y)),
+                slope(sums.mean(along_x, above), sums.mean(along_x, below)),
+            ];
+            // 255 levels in 64ths, and one, are less than 2^15.
+            means[x] = sums.mean(along_x, along_y).map_or(0, |mean| mean as i16 + 1);
         }
     }
-    out
+    Shading { slopes, means }
 }
 
 /// Sums of brightness over the pixels left of and above each corner, and their number.
@@ -120,25 +118,25 @@ mod tests {
         // Three levels a column, two a row. Sides of two pixels: their middles lie three pixels apart.
         let ramp = view(|x, y| (3 * x + 2 * y) as u8, |_, _| true);
         let shading = shading(&ramp, &canvas_but(33));
-        let slope = |at: usize| shading[at].slope;
+        let slope = |at: usize| shading.slopes[at];
         assert_eq!(slope(15 * 40 + 20), [9 * FRACTION as i16, 6 * FRACTION as i16]);
-        assert_eq!(shading[15 * 40 + 20].mean, Some((3 * 20 + 2 * 15) * FRACTION as i16));
+        assert_eq!(shading.means[15 * 40 + 20], (3 * 20 + 2 * 15) * FRACTION as i16 + 1);
         // Beside the border the side that is left counts: one pixel, its middle two and a half away.
         assert_eq!(slope(15 * 40 + 1), [15 * FRACTION as i16 / 2, 6 * FRACTION as i16]);
         assert_eq!(slope(15 * 40), [0, 6 * FRACTION as i16]);
         // Not wanted.
-        assert_eq!(shading[15 * 40 + 30], Shading::default());
+        assert_eq!((shading.slopes[15 * 40 + 30], shading.means[15 * 40 + 30]), ([0, 0], 0));
     }
 
     #[test]
     fn texture_is_no_slope_and_what_is_not_covered_takes_no_part() {
         let stripes = view(|x, _| if x % 2 == 0 { 90 } else { 110 }, |_, _| true);
-        let is_even = |shading: &Shading| shading.slope == [0, 0];
-        assert!(shading(&stripes, &canvas_but(0)).iter().skip(15 * 40 + 5).take(30).all(is_even));
+        let is_even = |slope: &[i16; 2]| *slope == [0, 0];
+        assert!(shading(&stripes, &canvas_but(0)).slopes.iter().skip(15 * 40 + 5).take(30).all(is_even));
         let half = view(|x, _| if x < 20 { 100 } else { 0 }, |x, _| x < 20);
         let shading = shading(&half, &canvas_but(0));
-        assert!(shading.iter().all(is_even));
-        let level = 100 * FRACTION as i16;
-        assert_eq!([10, 23, 30].map(|x| shading[15 * 40 + x].mean), [Some(level), Some(level), None]);
+        assert!(shading.slopes.iter().all(is_even));
+        let level = 100 * FRACTION as i16 + 1;
+        assert_eq!([10, 23, 30].map(|x| shading.means[15 * 40 + x]), [level, level, 0]);
     }
 }
