@@ -32,68 +32,69 @@ fn sector(frame: &Matrix3<f64>, vertical: usize, toward: &Vector3<f64>) -> usize
     ((longitude + std::f64::consts::PI) / SECTOR_DEG.to_radians()) as usize
 }
 
-/// How far an axis of a frame depends on what is asked of the scene.
-#[derive(Debug, Clone, Copy)]
+/// How far an axis of a frame depends on what is asked of the scene, by frames found without one group of it each.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct AxisScatter {
-    /// Covariance of the axis, rad^2; infinite on the diagonal where nothing tells.
+    /// Covariance of the axis, rad^2; too small of few groups, as Student's t knows.
     pub covariance: Matrix3<f64>,
+    /// How many groups it comes from: two or more.
+    pub groups: usize,
 }
 
 impl AxisScatter {
-    /// Of a covariance that `groups` tell, two or more: it grows as Student's t does, and the fewer they are, the less it is believed that the axis is
+    /// Of column `axis` of frames found without one group each; `None` of fewer than two.
+    pub(super) fn of(frames: &[Matrix3<f64>], axis: usize) -> Option<Self> {
+        if frames.len() < 2 {
+            return None;
+        }
+        let groups = frames.len() as f64;
+        let mean = frames.iter().map(|frame| frame.column(axis).into_owned()).sum::<Vector3<f64>>() / groups;
+        let from_mean = |frame: &Matrix3<f64>| frame.column(axis) - mean;
+        let spread: Matrix3<f64> = frames.iter().map(|frame| from_mean(frame) * from_mean(frame).transpose()).sum();
+        Some(Self { covariance: spread * ((groups - 1.0) / groups), groups: frames.len() })
+    }
+
+    /// Degrees of freedom that the covariance is estimated with.
+    pub(super) fn degrees_of_freedom(&self) -> usize {
+        self.groups - 1
+    }
+
+    /// The covariance to weigh `axis` by: it grows as Student's t does, and the fewer groups tell it, the less it is believed that the axis is
     /// surer one way than the other.
-    pub(super) fn of_groups(covariance: &Matrix3<f64>, axis: &Vector3<f64>, groups: usize) -> Self {
-        let free = groups as f64 - 1.0;
+    pub(super) fn widened(&self, axis: &Vector3<f64>) -> Matrix3<f64> {
+        let free = self.degrees_of_freedom() as f64;
         let few = 1.0 + FEW_GROUPS / free;
-        let about = (Matrix3::identity() - axis * axis.transpose()) * (0.5 * covariance.trace());
-        let shaped = (covariance * free + about * SHAPELESS_GROUPS) / (free + SHAPELESS_GROUPS);
-        Self { covariance: shaped * few.powi(2) }
-    }
-
-    /// Of an axis of which nothing is known.
-    fn unknown() -> Self {
-        Self { covariance: Matrix3::from_diagonal_element(f64::INFINITY) }
-    }
-
-    /// Standard deviation in radians, about both of its tangents together.
-    pub(super) fn deviation(&self) -> f64 {
-        self.covariance.trace().sqrt()
+        let about = (Matrix3::identity() - axis * axis.transpose()) * (0.5 * self.covariance.trace());
+        (self.covariance * free + about * SHAPELESS_GROUPS) / (free + SHAPELESS_GROUPS) * few.powi(2)
     }
 }
 
-/// Scatter of the vertical, column `vertical` of a frame that a refinement found, by what is left without one sector of the
+/// Standard deviation in radians of an axis of this covariance, about both of its tangents together.
+pub(super) fn deviation(covariance: &Matrix3<f64>) -> f64 {
+    covariance.trace().sqrt()
+}
+
+/// Covariance of the vertical, column `vertical` of a frame that a refinement found, rad^2, by what is left without one sector of the
 /// scene each; `None` with fewer than [`MIN_SECTORS`]. One thing that several photographs show is in the lines of all of them: leaving out
 /// photographs does not show that all rests on it.
-pub(super) fn scatter_by_sectors(vote: &LineVote, refinement: Refinement<'_>, vertical: usize) -> Option<AxisScatter> {
+pub(super) fn covariance_by_sectors(
+    vote: &LineVote,
+    refinement: Refinement<'_>,
+    vertical: usize,
+) -> Option<Matrix3<f64>> {
     let frames = without_each_sector(vote, refinement, vertical);
-    (frames.len() >= MIN_SECTORS).then(|| axis_scatter(&frames, vertical))
+    let scatter = AxisScatter::of(&frames, vertical).filter(|scatter| scatter.groups >= MIN_SECTORS)?;
+    Some(scatter.widened(&refinement.start.column(vertical).into_owned()))
 }
 
-/// Scatter, by a delete-a-group jackknife over the photographs, of an axis (a column) of a frame that a refinement found, from which it starts again: how
-/// much it depends on which photographs are asked. Unknown of a single photograph.
+/// Covariance, rad^2, by a delete-a-group jackknife over the photographs, of an axis (a column) of a frame that a refinement found, from which it starts
+/// again: how much it depends on which photographs are asked. Infinite on the diagonal of a single photograph, of which nothing is known.
 ///
 /// Photographs, not segments, are left out, because the segments of one photograph err together.
-pub(super) fn scatter_by_photographs(vote: &LineVote, refinement: Refinement<'_>, axis: usize) -> AxisScatter {
-    let frames = without_some_photographs(vote, refinement);
-    if frames.len() < 2 {
-        return AxisScatter::unknown();
-    }
-    axis_scatter(&frames, axis)
-}
-
-/// Scatter of an axis, by frames found without one group each, of which there are two or more.
-fn axis_scatter(frames: &[Matrix3<f64>], axis: usize) -> AxisScatter {
-    let mean: Vector3<f64> = frames.iter().map(|frame| frame.column(axis).into_owned()).sum();
-    AxisScatter::of_groups(&axis_covariance(frames, axis), &mean.normalize(), frames.len())
-}
-
-/// Covariance of an axis, rad^2, by frames found without one group each, of which there are two or more; too small of few groups, as Student's t knows.
-pub(super) fn axis_covariance(frames: &[Matrix3<f64>], axis: usize) -> Matrix3<f64> {
-    let groups = frames.len() as f64;
-    let mean: Vector3<f64> = frames.iter().map(|frame| frame.column(axis).into_owned()).sum::<Vector3<f64>>() / groups;
-    let from_mean = |frame: &Matrix3<f64>| frame.column(axis) - mean;
-    let spread: Matrix3<f64> = frames.iter().map(|frame| from_mean(frame) * from_mean(frame).transpose()).sum();
-    spread * ((groups - 1.0) / groups)
+pub(super) fn covariance_by_photographs(vote: &LineVote, refinement: Refinement<'_>, axis: usize) -> Matrix3<f64> {
+    let scatter = AxisScatter::of(&without_some_photographs(vote, refinement), axis);
+    let widened = |scatter: AxisScatter| scatter.widened(&refinement.start.column(axis).into_owned());
+    scatter.map_or_else(|| Matrix3::from_diagonal_element(f64::INFINITY), widened)
 }
 
 /// The frames that come out of a refined one when the segments of one group of photographs at a time are not asked: at most [`MAX_GROUPS`]
@@ -131,9 +132,12 @@ mod tests {
     #[test]
     fn the_jackknife_of_known_frames() {
         let frames = [rotation_about_y(0.01), rotation_about_y(-0.01), rotation_about_z(0.01), rotation_about_z(-0.01)];
+        let found =
+            |axis| deviation(&AxisScatter::of(&frames, axis).expect("four groups").widened(&Vector3::ith(axis, 1.0)));
         let few = 1.22;
-        assert!((axis_scatter(&frames, 0).deviation() / (few * 3e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
-        assert!((axis_scatter(&frames, 2).deviation() / (few * 1.5e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
+        assert!((found(0) / (few * 3e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
+        assert!((found(2) / (few * 1.5e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
+        assert_eq!(AxisScatter::of(&frames[..1], 0), None);
     }
 
     /// By hand: of variances 8 and 0 about x and z, mean 4, three groups have two degrees of freedom: (2 x 8 + 2 x 4) / 4 = 6 and (2 x 0 + 2 x 4) / 4 = 2,
@@ -141,10 +145,10 @@ mod tests {
     #[test]
     fn few_groups_tell_little_of_a_scatters_shape() {
         let covariance = Matrix3::from_diagonal(&Vector3::new(8e-4, 0.0, 0.0));
-        let few = AxisScatter::of_groups(&covariance, &Vector3::y(), 3).covariance;
+        let widened = |groups| AxisScatter { covariance, groups }.widened(&Vector3::y());
         let expected = Matrix3::from_diagonal(&Vector3::new(6e-4, 0.0, 2e-4)) * 1.7689;
-        assert!((few - expected).norm() < 1e-12, "{few}");
-        assert!((AxisScatter::of_groups(&covariance, &Vector3::y(), 1000).covariance - covariance).norm() < 3e-6);
+        assert!((widened(3) - expected).norm() < 1e-12, "{}", widened(3));
+        assert!((widened(1000) - covariance).norm() < 3e-6);
     }
 
     /// By hand: sectors are counted from half a turn to the left of the axis after the next one, toward the next.

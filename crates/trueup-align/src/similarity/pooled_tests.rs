@@ -5,7 +5,7 @@ use trueup_core::geometry::rotation_about_z;
 
 use super::SimilarityOptions;
 use super::frame_search::GUIDING_SIGNIFICANCE;
-use super::jackknife::scatter_by_photographs;
+use super::jackknife::{self, covariance_by_photographs};
 use super::joint::{LineVote, Refinement};
 use super::synthetic::{Sweep, SyntheticScene, World};
 use super::tests::{missing, with_lines};
@@ -83,8 +83,8 @@ fn photographs_that_contradict_each_other_leave_the_vertical_uncertain() {
         // The true frame in the cameras' world.
         let frame = rotations[0].transpose() * scene.world_from_camera[0].transpose();
         let start = vote.refine_frame(&frame, &[1.0; 3]);
-        scatter_by_photographs(&vote, Refinement { start: &start, axes_used: 3, axis_weights: &[1.0; 3] }, 1)
-            .deviation()
+        let refinement = Refinement { start: &start, axes_used: 3, axis_weights: &[1.0; 3] };
+        jackknife::deviation(&covariance_by_photographs(&vote, refinement, 1))
     };
     let agreed = deviation(&scene);
     assert!(agreed < 0.1_f64.to_radians(), "{agreed}");

@@ -25,9 +25,7 @@ use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 
 use super::camera_correction::{corrected_rotations, relative_certainties, turn_covariances};
-use super::jackknife::{
-    MIN_SECTORS, SCENE_DEVIATION_DEG, axis_covariance, without_each_sector, without_some_photographs,
-};
+use super::jackknife::{AxisScatter, MIN_SECTORS, SCENE_DEVIATION_DEG, without_each_sector, without_some_photographs};
 use super::joint::{AxisWeights, LineVote, Refinement};
 use super::prior::{SimilarityPrior, VerticalSpread};
 use super::vertical::roll_of;
@@ -90,19 +88,21 @@ pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRol
     }
     let UprightScene { frame, vertical, axes_used, axis_weights, .. } = &scene;
     let refinement = Refinement { start: frame, axes_used: *axes_used, axis_weights };
-    let scatter = |frames: Vec<Matrix3<f64>>, fewest: usize| Scatter::of(&frames, *vertical, fewest);
+    let scatter = |frames: Vec<Matrix3<f64>>, fewest: usize| {
+        AxisScatter::of(&frames, *vertical).filter(|scatter| scatter.groups >= fewest)
+    };
     let by_sectors = scatter(without_each_sector(&vote, refinement, *vertical), MIN_SECTORS)?;
     let by_photographs = scatter(without_some_photographs(&vote, refinement), MIN_GROUPS);
-    let by_kinds = scene.spread.as_ref().and_then(Scatter::of_spread);
+    let by_kinds = scene.spread.as_ref().and_then(scatter_of_spread);
     let others = by_photographs.into_iter().chain(by_kinds);
-    let scatters: Vec<Scatter> = match input.prior.guidance.pooled {
+    let scatters: Vec<AxisScatter> = match input.prior.guidance.pooled {
         true => std::iter::once(by_sectors).chain(others).collect(),
-        false => vec![Scatter::mean(by_sectors, others)],
+        false => vec![mean_scatter(by_sectors, others)],
     };
     let certainties = relative_certainties(&scene.cameras(input), input.edges);
     let turns = turn_covariances(&scene.rotations, &certainties, &vote, frame, axis_weights)?;
     let estimate = |(rotation, turn): (&Matrix3<f64>, &Matrix3<f64>)| {
-        let estimates = scatters.iter().filter_map(|scatter| scatter.estimate(&down, rotation, turn));
+        let estimates = scatters.iter().filter_map(|scatter| estimated_roll(scatter, &down, rotation, turn));
         estimates.max_by(|one, other| one.within.total_cmp(&other.within))
     };
     Some(scene.rotations.iter().zip(&turns).map(estimate).collect())
@@ -183,52 +183,41 @@ impl UprightScene {
     }
 }
 
-/// How far the vertical depends on which sectors of the scene, or which photographs, are asked.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Scatter {
-    /// Covariance of the vertical's direction, rad^2.
-    covariance: Matrix3<f64>,
-    /// Degrees of freedom that it is estimated with.
-    freedom: usize,
+/// That of a spread; `None` of fewer groups than tell anything. It is of the sectors, or photographs, that others are of.
+fn scatter_of_spread(spread: &VerticalSpread) -> Option<AxisScatter> {
+    let covariance = matrix_from_rows(&spread.covariance);
+    (spread.groups >= MIN_GROUPS).then_some(AxisScatter { covariance, groups: spread.groups })
 }
 
-impl Scatter {
-    /// The jackknife of the verticals, column `vertical` of the frames found without one group each; `None` with fewer than `fewest`, which is two or more.
-    fn of(frames: &[Matrix3<f64>], vertical: usize, fewest: usize) -> Option<Self> {
-        let groups = frames.len();
-        (groups >= fewest).then(|| Self { covariance: axis_covariance(frames, vertical), freedom: groups - 1 })
-    }
+/// The mean of several estimates of one covariance, with the most groups of them: they are of the same lines.
+fn mean_scatter(first: AxisScatter, others: impl Iterator<Item = AxisScatter>) -> AxisScatter {
+    let (sum, count) = others.fold((first, 1.0), |(sum, count), one| {
+        let groups = sum.groups.max(one.groups);
+        (AxisScatter { covariance: sum.covariance + one.covariance, groups }, count + 1.0)
+    });
+    AxisScatter { covariance: sum.covariance / count, ..sum }
+}
 
-    /// That of a spread; `None` of fewer groups than tell anything. It is of the sectors, or photographs, that others are of.
-    fn of_spread(spread: &VerticalSpread) -> Option<Self> {
-        let covariance = matrix_from_rows(&spread.covariance);
-        (spread.groups >= MIN_GROUPS).then_some(Self { covariance, freedom: spread.groups - 1 })
-    }
-
-    /// The mean of several estimates of one covariance, with the most degrees of freedom of them: they are of the same lines.
-    fn mean(first: Self, others: impl Iterator<Item = Self>) -> Self {
-        let (sum, count) = others.fold((first, 1.0), |(sum, count), one| {
-            let freedom = sum.freedom.max(one.freedom);
-            (Self { covariance: sum.covariance + one.covariance, freedom }, count + 1.0)
-        });
-        Self { covariance: sum.covariance / count, ..sum }
-    }
-
-    /// The roll of a camera, which `rotation` takes the world to, and whose own turn has the covariance `turn`.
-    fn estimate(&self, down: &Vector3<f64>, rotation: &Matrix3<f64>, turn: &Matrix3<f64>) -> Option<EstimatedRoll> {
-        let seen = rotation * down;
-        roll_of(&seen)?;
-        let across = Vector2::new(seen.y, -seen.x) / seen.xy().norm_squared();
-        // How the roll follows the vertical, and a turn w of the camera, which takes down d to d + w x d.
-        let by_down = rotation.tr_mul(&across.push(0.0));
-        let by_turn = down.cross(&by_down);
-        let scatter = by_down.dot(&(self.covariance * by_down));
-        let alike = by_turn.norm_squared() * SCENE_DEVIATION_DEG.to_radians().powi(2);
-        let own = by_turn.dot(&(turn * by_turn));
-        let within = (student_95(self.freedom).powi(2) * scatter + NORMAL_95.powi(2) * (alike + own)).sqrt();
-        let standard_error = (scatter + alike + own).sqrt();
-        Some(EstimatedRoll { down: seen, roll: roll_from_down(&seen), standard_error, within })
-    }
+/// The roll of a camera, which `rotation` takes the world to, and whose own turn has the covariance `turn`; the vertical has that of `scatter`.
+fn estimated_roll(
+    scatter: &AxisScatter,
+    down: &Vector3<f64>,
+    rotation: &Matrix3<f64>,
+    turn: &Matrix3<f64>,
+) -> Option<EstimatedRoll> {
+    let seen = rotation * down;
+    roll_of(&seen)?;
+    let across = Vector2::new(seen.y, -seen.x) / seen.xy().norm_squared();
+    // How the roll follows the vertical, and a turn w of the camera, which takes down d to d + w x d.
+    let by_down = rotation.tr_mul(&across.push(0.0));
+    let by_turn = down.cross(&by_down);
+    let asked = by_down.dot(&(scatter.covariance * by_down));
+    let alike = by_turn.norm_squared() * SCENE_DEVIATION_DEG.to_radians().powi(2);
+    let own = by_turn.dot(&(turn * by_turn));
+    let student = student_95(scatter.degrees_of_freedom());
+    let within = (student.powi(2) * asked + NORMAL_95.powi(2) * (alike + own)).sqrt();
+    let standard_error = (asked + alike + own).sqrt();
+    Some(EstimatedRoll { down: seen, roll: roll_from_down(&seen), standard_error, within })
 }
 
 /// 95 % of Student's t distribution lie within so many standard deviations.
@@ -264,36 +253,35 @@ mod tests {
     fn the_jackknife_of_known_verticals() {
         let down =
             |x: f64, z: f64| Matrix3::from_columns(&[Vector3::zeros(), Vector3::new(x, 0.0, z), Vector3::zeros()]);
-        let scatter = Scatter::of(&[down(0.01, 0.0), down(-0.01, 0.0), down(0.0, 0.01), down(0.0, -0.01)], 1, 4);
+        let scatter = AxisScatter::of(&[down(0.01, 0.0), down(-0.01, 0.0), down(0.0, 0.01), down(0.0, -0.01)], 1);
         let expected = Matrix3::from_diagonal(&Vector3::new(1.5e-4, 0.0, 1.5e-4));
         assert!((scatter.expect("four").covariance - expected).norm() < 1e-15);
-        assert_eq!(scatter.map(|scatter| scatter.freedom), Some(3));
-        assert_eq!(Scatter::of(&[down(0.01, 0.0)], 1, 2), None);
+        assert_eq!(scatter.map(|scatter| scatter.degrees_of_freedom()), Some(3));
     }
 
-    /// By hand: diagonals 1, 4, 7 come to 4; of three, five and two degrees of freedom five count.
+    /// By hand: diagonals 1, 4, 7 come to 4; of four, six and three groups six count.
     #[test]
     fn estimates_of_one_scatter_are_averaged() {
-        let of = |variance: f64, freedom| Scatter { covariance: Matrix3::identity() * variance, freedom };
-        let mean = Scatter::mean(of(1.0, 3), [of(4.0, 5), of(7.0, 2)].into_iter());
-        assert!((mean.covariance - Matrix3::identity() * 4.0).norm() < 1e-12 && mean.freedom == 5);
-        assert_eq!(Scatter::mean(of(1.0, 3), std::iter::empty()), of(1.0, 3));
+        let of = |variance: f64, groups| AxisScatter { covariance: Matrix3::identity() * variance, groups };
+        let mean = mean_scatter(of(1.0, 4), [of(4.0, 6), of(7.0, 3)].into_iter());
+        assert!((mean.covariance - Matrix3::identity() * 4.0).norm() < 1e-12 && mean.groups == 6);
+        assert_eq!(mean_scatter(of(1.0, 4), std::iter::empty()), of(1.0, 4));
     }
 
     /// A level camera that looks along z: a turn about z of the scene is its roll, one about x is none of it.
     #[test]
     fn a_level_camera_rolls_as_far_as_the_vertical_leans_across() {
         let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 0.0, 9e-4));
-        let scatter = Scatter { covariance, freedom: 30 };
+        let scatter = AxisScatter { covariance, groups: 31 };
         let (down, level) = (Vector3::y(), Matrix3::identity());
-        let found = scatter.estimate(&down, &level, &Matrix3::zeros()).expect("level");
+        let found = estimated_roll(&scatter, &down, &level, &Matrix3::zeros()).expect("level");
         let alike = SCENE_DEVIATION_DEG.to_radians().powi(2);
         assert!((found.standard_error - (4e-4 + alike).sqrt()).abs() < 1e-12 && found.roll.abs() < 1e-15);
         let expected = (2.042_272_f64.powi(2) * 4e-4 + NORMAL_95.powi(2) * alike).sqrt();
         assert!((found.within / expected - 1.0).abs() < 1e-5);
-        let turned = scatter.estimate(&down, &level, &Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1e-4)));
+        let turned = estimated_roll(&scatter, &down, &level, &Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1e-4)));
         assert!((turned.expect("level").standard_error - (5e-4 + alike).sqrt()).abs() < 1e-12);
         let steep = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0);
-        assert_eq!(scatter.estimate(&down, &steep, &Matrix3::zeros()), None);
+        assert_eq!(estimated_roll(&scatter, &down, &steep, &Matrix3::zeros()), None);
     }
 }

@@ -10,7 +10,7 @@ use super::dominant::{Dominant, dominant_frame};
 use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrames, search_frames};
 use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
-use super::jackknife::{AxisScatter, scatter_by_photographs, scatter_by_sectors};
+use super::jackknife::{covariance_by_photographs, covariance_by_sectors, deviation};
 use super::joint::{self, AxisWeights, LineVote, Refinement};
 use super::level::{CameraLevel, mean_square_roll};
 use super::options::{GateMode, SimilarityOptions};
@@ -242,8 +242,8 @@ impl<'a> SceneDirections<'a> {
         if joint {
             let vertical = column_near(&frame, &down);
             let refinement = Refinement { start: &frame, axes_used: 3, axis_weights: &axis_weights };
-            let scatter = self.scatter(refinement, vertical, asked.as_ref(), guidance.pooled);
-            down = self.weighed(&down, &scatter, guidance)?;
+            let covariance = self.covariance(refinement, vertical, asked.as_ref(), guidance.pooled);
+            down = self.weighed(&down, &covariance, guidance)?;
         }
         guidance.spread = reconciled.map(|found| VerticalSpread::about(&down, &found));
         guidance.dominant = Some(rows_of(&(turn_between(&self.vertical(&frame), &down) * frame)));
@@ -257,35 +257,37 @@ impl<'a> SceneDirections<'a> {
         Ok(self.solve(&down, &own, rotations, guidance))
     }
 
-    /// Scatter of the vertical, column `vertical` of a frame that lines refined, by asking different photographs; or without one
+    /// Covariance of the vertical, column `vertical` of a frame that lines refined, rad^2, by asking different photographs; or without one
     /// sector of the scene each, where that is beyond what may guide: then all photographs know it from one and the same thing. What is
     /// `reconciled` knows that already. Of a frame of all lines together (`pooled`) the larger counts in any case: single photographs agree on nothing.
-    fn scatter(
+    fn covariance(
         &self,
         refinement: Refinement<'_>,
         vertical: usize,
         reconciled: Option<&Reconciled>,
         pooled: bool,
-    ) -> AxisScatter {
-        let by_photographs = scatter_by_photographs(&self.vote, refinement, vertical);
+    ) -> Matrix3<f64> {
+        let by_photographs = covariance_by_photographs(&self.vote, refinement, vertical);
         let by_sectors = match reconciled {
-            Some(found) => Some(AxisScatter { covariance: found.covariance }),
-            None => scatter_by_sectors(&self.vote, refinement, vertical),
+            Some(found) => Some(found.covariance),
+            None => covariance_by_sectors(&self.vote, refinement, vertical),
         };
-        let wider = |scatter: &AxisScatter| scatter.deviation() > by_photographs.deviation();
-        let counts = |scatter: &AxisScatter| pooled || scatter.deviation() > MAX_GUIDING_DEVIATION_DEG.to_radians();
-        by_sectors.filter(|scatter| counts(scatter) && wider(scatter)).unwrap_or(by_photographs)
+        // A deviation that is not a number is no more than another: sectors count then.
+        let wider = |sectors: f64| sectors > deviation(&by_photographs) || deviation(&by_photographs).is_nan();
+        let counts = |sectors: f64| pooled || sectors > MAX_GUIDING_DEVIATION_DEG.to_radians();
+        let chosen = by_sectors.filter(|covariance| counts(deviation(covariance)) && wider(deviation(covariance)));
+        chosen.unwrap_or(by_photographs)
     }
 
     /// The vertical of lines weighed against what else is known of it; an error with that vertical if lines do not guide it, with the
-    /// failed clause. `scatter` is the lines', by asking different photographs.
+    /// failed clause. `covariance` is the lines', rad^2, by asking different photographs.
     fn weighed(
         &self,
         lines: &Vector3<f64>,
-        scatter: &AxisScatter,
+        covariance: &Matrix3<f64>,
         guidance: &mut Guidance,
     ) -> std::result::Result<Vector3<f64>, Vector3<f64>> {
-        let deviation = scatter.deviation();
+        let deviation = deviation(covariance);
         guidance.vertical_deviation = Some(deviation).filter(|deviation| deviation.is_finite());
         if self.options.gate == GateMode::Paper {
             return Ok(*lines);
@@ -314,14 +316,14 @@ impl<'a> SceneDirections<'a> {
         // Also of photographs whose own directions do not agree, lines may.
         let telling = self.vote.support(lines, joint::TOLERANCE_DEG.to_radians()).photographs;
         let believed = self.level.without_contradicted_horizon(lines, deviation);
-        let (down, evidence) = believed.with_lines(lines, &scatter.covariance, telling);
+        let (down, evidence) = believed.with_lines(lines, covariance, telling);
         let outweigh = evidence.first().is_some_and(|lines| lines.share >= GUIDING_SHARE);
         if outweigh && degrees <= MAX_GUIDING_DEVIATION_DEG {
             guidance.level = evidence;
             return Ok(down);
         }
         // A horizon that they contradict counts beside lines that do not guide.
-        let (down, evidence) = self.level.with_lines(lines, &scatter.covariance, telling);
+        let (down, evidence) = self.level.with_lines(lines, covariance, telling);
         guidance.level = evidence;
         guidance.pooled = false;
         let limit = match outweigh {
@@ -365,9 +367,9 @@ impl<'a> SceneDirections<'a> {
         let (first, second) = orthonormal_complement(&peak.down);
         let frame = Matrix3::from_columns(&[peak.down, first, second]);
         let refinement = Refinement { start: &frame, axes_used: 1, axis_weights: &[1.0; 3] };
-        let scatter = self.scatter(refinement, 0, None, false);
+        let covariance = self.covariance(refinement, 0, None, false);
         let refused = guidance.clone();
-        let Ok(down) = self.weighed(&peak.down, &scatter, guidance) else {
+        let Ok(down) = self.weighed(&peak.down, &covariance, guidance) else {
             *guidance = refused;
             return None;
         };

@@ -8,9 +8,7 @@
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use trueup_core::geometry::orthonormal_complement;
 
-use super::jackknife::{
-    MIN_SECTORS, SCENE_DEVIATION_DEG, axis_covariance, without_each_sector, without_some_photographs,
-};
+use super::jackknife::{AxisScatter, MIN_SECTORS, SCENE_DEVIATION_DEG, without_each_sector, without_some_photographs};
 use super::joint::{AxisWeights, LineVote, Refinement, TOLERANCE_DEG};
 
 /// Standard deviation, about either axis, of the vertical that truly level lines imply from the true one, degrees. Reasoned: what is
@@ -81,29 +79,30 @@ pub(super) fn reconciled(vote: &LineVote, frame: &Matrix3<f64>, vertical: usize,
     let tangent = Matrix3x2::from_columns(&[first, second]);
     let upright_refinement = Refinement { start: &upright_frame, axes_used: 1, axis_weights: &[1.0; 3] };
     let level_refinement = Refinement { start: &level_frame, axes_used: 3, axis_weights: &level_weights };
-    let (upright_covariance, groups) = scatter(vote, upright_refinement, 0)?;
-    let (level_covariance, _) = scatter(vote, level_refinement, vertical)?;
-    let say = |direction: &Vector3<f64>, covariance: Matrix3<f64>| Say {
+    let upright_scatter = scatter(vote, upright_refinement, 0)?;
+    let level_scatter = scatter(vote, level_refinement, vertical)?;
+    let say = |direction: &Vector3<f64>, scatter: &AxisScatter| Say {
         place: tangent.tr_mul(direction),
-        covariance: tangent.tr_mul(&(covariance * tangent)),
+        covariance: tangent.tr_mul(&(scatter.covariance * tangent)),
     };
-    let weighed = weighed(&say(&upright, upright_covariance), &say(&level, level_covariance), agreement)?;
+    let weighed = weighed(&say(&upright, &upright_scatter), &say(&level, &level_scatter), agreement)?;
     let covariance = tangent * weighed.mean.covariance * tangent.transpose();
     let vertical = (start + tangent * weighed.mean.place).normalize();
     let finite = vertical.iter().chain(covariance.iter()).all(|value| value.is_finite());
     let angle = upright.angle(&level);
+    let groups = upright_scatter.groups;
     finite.then_some(Reconciled { vertical, covariance, groups, upright, angle, sloping: weighed.sloping })
 }
 
-/// Covariance of column `axis` of a refined frame by leaving out one sector of the scene each; where lines are in too few of these, one
-/// photograph each; and of how many groups. `None` with a single photograph.
-fn scatter(vote: &LineVote, refinement: Refinement<'_>, axis: usize) -> Option<(Matrix3<f64>, usize)> {
+/// Scatter of column `axis` of a refined frame by leaving out one sector of the scene each; where lines are in too few of these, one
+/// photograph each. `None` with a single photograph.
+fn scatter(vote: &LineVote, refinement: Refinement<'_>, axis: usize) -> Option<AxisScatter> {
     let by_sectors = without_each_sector(vote, refinement, axis);
     let frames = match by_sectors.len() {
         MIN_SECTORS.. => by_sectors,
         _ => without_some_photographs(vote, refinement),
     };
-    (frames.len() >= 2).then(|| (axis_covariance(&frames, axis), frames.len()))
+    AxisScatter::of(&frames, axis)
 }
 
 /// The mean of two normal distributions: that level lines are level, and that they lie along a slope. Each has the place of least squares, and is as probable as

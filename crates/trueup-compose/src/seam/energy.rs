@@ -48,7 +48,7 @@ pub(super) struct SeamEnergy<'a> {
     shading: Vec<Shading>,
     /// For every canvas pixel that is prepared: by how much more than [`HIDDEN_STEP`] the photographs' mean brightness lies apart there, in [`FRACTION`]s
     /// of a level. Empty if it does not count.
-    spread: Vec<i16>,
+    steps: Vec<i16>,
     depths: Vec<Depths>,
     softness: &'a [Softness],
     /// How often the canvas that the softness is of was halved.
@@ -105,7 +105,7 @@ impl<'a> SeamEnergy<'a> {
             views,
             gradients: Vec::new(),
             shading: Vec::new(),
-            spread: Vec::new(),
+            steps: Vec::new(),
             depths: views.par_iter().map(SmallView::depths).collect(),
             softness,
             halvings,
@@ -128,15 +128,15 @@ impl<'a> SeamEnergy<'a> {
         self.gradients = views.par_iter().map(|view| gradients(view, wanted)).collect();
         if self.shading_weight > 0 {
             self.shading = views.par_iter().map(|view| shading(view, wanted)).collect();
-            self.spread = self.spread(wanted);
+            self.steps = self.steps(wanted);
         }
     }
 
-    /// See [`Self::spread`], the field.
-    fn spread(&self, wanted: &Band) -> Vec<i16> {
+    /// See [`Self::steps`], the field.
+    fn steps(&self, wanted: &Band) -> Vec<i16> {
         let hidden = HIDDEN_STEP * FRACTION as i16;
-        let mut spread = vec![0; self.width * self.height];
-        spread.par_chunks_exact_mut(self.width.max(1)).enumerate().for_each(|(y, spread)| {
+        let mut steps = vec![0; self.width * self.height];
+        steps.par_chunks_exact_mut(self.width.max(1)).enumerate().for_each(|(y, steps)| {
             let mut prepared = wanted.within(&(0..self.width), y);
             let Some(first) = prepared.next() else { return };
             let last = prepared.last().unwrap_or(first);
@@ -151,11 +151,11 @@ impl<'a> SeamEnergy<'a> {
                     }
                 }
             }
-            for (spread, (least, most)) in spread[first..].iter_mut().zip(range) {
-                *spread = most.saturating_sub(least).saturating_sub(hidden).max(0);
+            for (step, (least, most)) in steps[first..].iter_mut().zip(range) {
+                *step = most.saturating_sub(least).saturating_sub(hidden).max(0);
             }
         });
-        spread
+        steps
     }
 
     /// The canvas column of a column that may lie in the next turn.
@@ -252,11 +252,11 @@ impl<'a> SeamEnergy<'a> {
             let (g, h) = (self.shading[a].slopes[i], self.shading[b].slopes[j]);
             let slope: i32 = (0..2).map(|axis| (i32::from(g[axis]) - i32::from(h[axis])).abs()).sum();
             difference += slope * self.shading_weight / FRACTION;
-            let lack = self.depths[a].lack_of_room(i) + self.depths[b].lack_of_room(j);
-            if lack > 0 {
-                // Of all photographs, not of these two: so three obey the triangle inequality.
-                let apart = i32::from(self.spread[y * self.width + self.column(x)]) * lack / WHOLE_LACK;
-                difference += apart * self.shading_weight / (FRACTION * SLOPES_PER_STEP);
+            // Of all photographs, not of these two: so three obey the triangle inequality.
+            let step = i32::from(self.steps[y * self.width + self.column(x)]);
+            if step > 0 {
+                let lack = self.depths[a].lack_of_room(i) + self.depths[b].lack_of_room(j);
+                difference += step * lack / WHOLE_LACK * self.shading_weight / (FRACTION * SLOPES_PER_STEP);
             }
         }
         difference.min(MAX_DIFFERENCE)

@@ -69,7 +69,8 @@ struct Labelled {
 ///
 /// # Departures
 /// Coarse to fine as Lombaert, Sun, Grady, Xu, "A multilevel banded graph cuts method for fast image segmentation", ICCV
-/// 2005; things that moved are found first, and their parts kept together; differences of shading count, and the lack of detail, too.
+/// 2005; things that moved are found first, and their parts kept together; differences of shading count, the lack of detail, and steps that there is no room
+/// to blend, too.
 pub fn run(input: &SeamInput<'_>, options: &SeamOptions, context: &StageContext) -> Result<Seams> {
     coarse_to_fine(input, COARSE_PIXELS, options, context)
 }

@@ -13,8 +13,9 @@ trueup_core::options! {
         /// Further cost of a seam through a thing that moved. Raise it if people or cars are cut in half.
         moving_cost: f64 = 60.0, between(0.0, 1000.0), "level";
         /// Weight of the difference of shading beside that of colors: of how the brightness changes over a few pixels, averaged
-        /// along a line. Higher keeps seams from where only a step could join the photographs: raise it if steps are seen in skies
-        /// and on walls, lower it if seams go through contours to avoid these.
+        /// along a line, and of steps of the mean brightness where a wide transition has no room. Higher keeps seams from where only a
+        /// step could join the photographs: raise it if steps are seen in skies and on walls, lower it if seams go through contours to
+        /// avoid these.
         shading_weight: f64 = 3.0, between(0.0, 100.0), "";
     }
 }
