@@ -83,7 +83,7 @@ fn fill<P: Shade>(store: &mut PixelStore<P>, size: [usize; 2], gaps: &Gaps, cont
         return Ok(0);
     }
     let all = canvas.reduced(store, &sources, &BorderColors::default(), context)?;
-    let around = BorderColors::of(all, canvas.first_level);
+    let around = BorderColors::of(&all, canvas.first_level);
     let surface = surface(canvas.reduced(store, &sources, &around, context)?);
     let once = [canvas.lead, canvas.lead + canvas.width].map(|column| column >> canvas.first_level);
     let poles = Poles::of(size, gaps, &surface, once[0]..once[1]);
@@ -315,9 +315,18 @@ impl<'a> Canvas<'a> {
             let (columns, rows) = self.with_margin(tile);
             PyramidPlane::new(columns, rows)
         };
-        let mut levels = vec![self.known(store, tile, &filling.around)?.unwrap_or_else(nothing_known)];
+        let known = |around: &BorderColors| -> Result<PyramidPlane<[f32; 4]>> {
+            Ok(self.known(store, tile, around)?.unwrap_or_else(nothing_known))
+        };
+        let mut levels = vec![known(&filling.around)?];
         for _ in 1..self.first_level {
             levels.extend(levels.last().map(PyramidPlane::reduced));
+        }
+        // Whatever ends at a gap goes on for a pixel or two, which is all that there is of a hairline.
+        let mut beside: PyramidPlane<[f32; 4]> = known(&BorderColors::default())?;
+        for level in levels.iter_mut().take(HAIRLINE_LEVELS) {
+            let reduced = beside.reduced();
+            *level = std::mem::replace(&mut beside, reduced);
         }
         let surface = pulled(levels, Some(&filling.surface));
         let mut filled = 0;
@@ -357,12 +366,29 @@ struct BorderColors {
 }
 
 impl BorderColors {
-    /// From what is known of the borders at a level.
-    fn of(known: PyramidPlane<[f32; 4]>, level: u32) -> Self {
-        /// Levels above it: samples of 32 pixels on most canvases, which see three times as far, so that a lamp or a twig is the lesser part
-        /// of what they see.
-        const COARSER: u32 = 2;
-        Self { means: (0..COARSER).fold(known, |plane, _| plane.reduced()), level: level + COARSER }
+    /// From what is known of the borders at a level: the kind of color that is more of a wide part of the border, and by it that of ever smaller parts. Where
+    /// a roof meets the sky beside a gap, the mean of both is neither.
+    fn of(known: &PyramidPlane<[f32; 4]>, level: u32) -> Self {
+        /// Levels above it that the kind is sought at: samples of 64 pixels on most canvases at first, of 32 at last, which see three times as far, so that a lamp or a
+        /// twig is the lesser part of what they see. From samples of 128, a sky is carried on over the clouds that lie beside the gap.
+        const COARSER: [u32; 2] = [3, 2];
+        let means = |plane: PyramidPlane<[f32; 4]>, levels: u32| Self {
+            means: (0..levels).fold(plane, |plane, _| plane.reduced()),
+            level: level + levels,
+        };
+        COARSER[1..].iter().fold(means(known.clone(), COARSER[0]), |wider, &coarser| {
+            let mut belonging = known.clone();
+            for y in belonging.rows.clone() {
+                let first = belonging.columns.start;
+                for (x, texel) in (first..).zip(belonging.row_mut(y)) {
+                    if let Some(root) = color(*texel) {
+                        let share = wider.belonging(x << level, y << level, root);
+                        *texel = texel.map(|value| value * share);
+                    }
+                }
+            }
+            means(belonging, coarser)
+        })
     }
 
     /// How much a color at a pixel of the canvas belongs to the border around it: Tukey's biweight of its distance. A lamp that ends
@@ -404,6 +430,9 @@ fn spread(stretches: impl Iterator<Item = Range<usize>>, reach: usize, columns: 
     }
     spread
 }
+
+/// Levels, from pixels on, at which all that lies beside a gap is carried into it.
+const HAIRLINE_LEVELS: usize = 2;
 
 /// A sample counts as wholly known if this share of its surroundings is, its inverse: colors reach into a gap as far as the
 /// finest level that knows any, so that each place of a gap takes up what is next to it.

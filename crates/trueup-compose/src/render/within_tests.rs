@@ -90,13 +90,12 @@ fn fill(panorama: &mut Panorama) -> usize {
     panorama.fill(&gaps, &StageContext::default()).expect("room")
 }
 
-/// A photograph of 300 x 200 pixels below a strip of 20 empty rows and above 100 more, of the levels at its pixels; and the strip,
-/// as gaps.
-fn below_a_strip(level: impl Fn(usize, usize) -> u8) -> (Panorama, Gaps) {
+/// A photograph of 300 x 200 pixels below a `strip` of empty rows, 20 at most, and above 100 more, of the levels at its pixels; and the strip, as gaps.
+fn below_a_strip(strip: usize, level: impl Fn(usize, usize) -> u8) -> (Panorama, Gaps) {
     let samples = (0..300 * 200).flat_map(|at| [level(at % 300, at / 300); 3]).collect();
     let raster = trueup_core::raster::Raster::from_data(300, 200, 3, samples).expect("as many samples");
     let source = Memory(vec![trueup_core::raster::Photograph::Eight(raster)]);
-    let layout = canvas(300, 320, vec![moved(0, 300.0, 200.0, |p| [p.x, p.y + 20.0])]);
+    let layout = canvas(300, 300 + strip, vec![moved(0, 300.0, 200.0, |p| [p.x, p.y + strip as f64])]);
     let (options, seams, context) = (RenderOptions::default(), SeamOptions::default(), StageContext::default());
     let input = RenderInput { layout: &layout, corrections: &Corrections::plain(1), photographs: &source };
     let rendered = run(&input, &Resources::unlimited(), &options, &seams, None, &context).expect("one photograph");
@@ -106,7 +105,7 @@ fn below_a_strip(level: impl Fn(usize, usize) -> u8) -> (Panorama, Gaps) {
 #[test]
 fn gaps_take_up_the_colors_beside_them() {
     // A photograph that is dark on the left and bright on the right, below a strip of 20 rows.
-    let (mut panorama, gaps) = below_a_strip(|x, _| if x < 150 { 40 } else { 200 });
+    let (mut panorama, gaps) = below_a_strip(20, |x, _| if x < 150 { 40 } else { 200 });
     let before = rows(&panorama);
     assert_eq!(panorama.fill(&gaps, &StageContext::default()).expect("in memory"), 300 * 20);
     let mut row = vec![0; 4 * 300];
@@ -160,14 +159,43 @@ fn a_hole_at_a_pole_has_one_middle() {
 #[test]
 fn what_ends_at_the_border_is_not_carried_into_a_gap() {
     let scene = |x: usize, y: usize| if y >= 40 || (145..155).contains(&x) { 30 } else { 200 };
-    let (mut panorama, gaps) = below_a_strip(scene);
+    let (mut panorama, gaps) = below_a_strip(20, scene);
     panorama.fill(&gaps, &StageContext::default()).expect("in memory");
     let mut row = vec![0; 4 * 300];
-    for y in 0..20 {
+    // But for a pixel or two beside it.
+    for y in 0..17 {
         panorama.rgba8_row(y, &mut row).expect("in memory");
         let darkest = row.chunks_exact(4).map(|pixel| pixel[0]).min();
         assert!(darkest.is_some_and(|darkest| darkest >= 180), "row {y}: {darkest:?}");
     }
+}
+
+/// A bright sky that ends at a dark roof, of which the strip above sees as much as of the sky where they meet: all that reaches the border beyond it is sky,
+/// which is carried on to the corner. The mean of both was: a gray smear.
+#[test]
+fn where_two_colors_meet_the_one_that_is_more_of_the_border_is_carried_on() {
+    let (mut panorama, gaps) = below_a_strip(20, |x, _| if x < 30 { 90 } else { 250 });
+    panorama.fill(&gaps, &StageContext::default()).expect("in memory");
+    let mut row = vec![0; 4 * 300];
+    panorama.rgba8_row(2, &mut row).expect("in memory");
+    let levels: Vec<u8> = row.chunks_exact(4).map(|pixel| pixel[0]).collect();
+    assert!(levels.iter().all(|&level| level > 225), "{levels:?}");
+}
+
+/// The same post below a hairline, which shows the post where it ends at it, and not the sky around.
+#[test]
+fn all_that_ends_at_a_hairline_goes_on_in_it() {
+    let (mut panorama, gaps) = below_a_strip(2, |x, _| if (145..155).contains(&x) { 30 } else { 200 });
+    panorama.fill(&gaps, &StageContext::default()).expect("in memory");
+    let mut row = vec![0; 4 * 300];
+    panorama.rgba8_row(1, &mut row).expect("in memory");
+    assert!(
+        row[4 * 150] < 50 && row[4 * 130] > 195 && row[4 * 170] > 195,
+        "{} {} {}",
+        row[4 * 150],
+        row[4 * 130],
+        row[4 * 170]
+    );
 }
 
 #[test]
