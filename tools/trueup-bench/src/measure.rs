@@ -6,6 +6,10 @@ use std::path::Path;
 use serde_json::Value;
 use trueup::{Error, Project, Result, StageContext, Truth};
 
+/// The name of the local distortion that the experiments state: of the cells that lie with their centers and all their corners in no
+/// other photograph (equations 12 and 13). Known with the truth; what a panorama says of itself, `ld`, judges cells by their centers.
+pub(crate) const LD: &str = "ld_corners";
+
 /// Everything that is measured of a panorama: the gate's numbers, what the panorama's own lines and matches say, and with
 /// known cameras the numbers of [`trueup::evaluate`].
 ///

@@ -3,6 +3,7 @@
 use trueup::Result;
 
 use super::grid::{self, GridRow};
+use crate::measure::LD;
 use crate::methods::{
     ComparedMethod, Family, GSP_3D, GSP_3D_PUBLISHED, VPG, VPG_LINES_PUBLISHED, VPG_PIXELS_PUBLISHED, VPG_PUBLISHED,
     method, methods_of,
@@ -131,7 +132,7 @@ fn table(results: &Results, sets: &[SetSpec]) -> Table {
             number(value("ssim"), 4),
             number(value("match_rms_px"), 3),
             number(value("gdic_deg"), 2),
-            number(value("ld"), 2),
+            number(value(LD), 2),
             number(value("folds"), 1),
         ]);
     }

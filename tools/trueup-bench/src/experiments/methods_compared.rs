@@ -5,6 +5,7 @@ use trueup_report::charts::{Chart, Series, SeriesMark};
 
 use super::grid::{GridRow, id_of, table};
 use super::paper_figures::NATURAL;
+use crate::measure::LD;
 use crate::methods::{
     AANAP_PUBLISHED, ComparedMethod, Family, GSP_2D, GSP_2D_PUBLISHED, GSP_3D, GSP_3D_PUBLISHED, METHODS, VIEW, VPG,
     VPG_PUBLISHED, methods_of,
@@ -110,7 +111,7 @@ impl Contest {
     /// LD is comparable with that of every other method, on the sets that both do.
     fn claim_distortion(&self, results: &Results, sets: &[SetSpec]) -> Claim {
         let compared = |other: &&'static str| {
-            let (ours, theirs): (Vec<f64>, Vec<f64>) = pairs(results, sets, self.ours, other, "ld").into_iter().unzip();
+            let (ours, theirs): (Vec<f64>, Vec<f64>) = pairs(results, sets, self.ours, other, LD).into_iter().unzip();
             Some((*other, mean(&ours)?, mean(&theirs)?, ours.len()))
         };
         let found: Vec<_> = self.others.iter().filter_map(compared).collect();
@@ -151,14 +152,14 @@ pub(crate) fn section(results: &Results) -> Section {
     let sets = &results.catalogue.study;
     section.blocks.push(Block::Table(list_of_methods()));
     section.blocks.extend(claims(results).into_iter().map(Block::Claim));
-    for (measure, title) in [("ld", "LD x 1e-2"), ("gdic_deg", "GDIC, degrees")] {
+    for (measure, id, title) in [(LD, "ld", "LD x 1e-2"), ("gdic_deg", "gdic-deg", "GDIC, degrees")] {
         let mut rows = ours(results, sets, measure);
         rows.extend(NATURAL.iter().map(|row| match measure {
-            "ld" => GridRow::paper(row.method, &row.ld),
+            LD => GridRow::paper(row.method, &row.ld),
             _ => GridRow::paper(row.method, &row.gdic_deg),
         }));
         let caption = format!("T2: {title}.");
-        section.blocks.push(Block::Table(table(&format!("t2-{}", id_of(measure)), &caption, sets, &rows)));
+        section.blocks.push(Block::Table(table(&format!("t2-{id}"), &caption, sets, &rows)));
     }
     let refused = refusals(results, sets);
     if !refused.is_empty() {
@@ -237,7 +238,7 @@ fn given_tables(results: &Results, section: &mut Section) {
         ));
         return;
     }
-    let measures = ["ld", "gdic_deg", "theta_error_deg", "upright_deg", "align_px"];
+    let measures = [LD, "gdic_deg", "theta_error_deg", "upright_deg", "align_px"];
     let caption = format!("Medians over {} given sets.", sets.len());
     let mut medians = Table::new(
         "given-medians",

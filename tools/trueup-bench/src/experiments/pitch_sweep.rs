@@ -3,6 +3,7 @@
 use trueup::Result;
 use trueup_report::charts::{Chart, Series, SeriesMark};
 
+use crate::measure::LD;
 use crate::methods::{Family, LEVELLED, VPG, VPG_PUBLISHED, method, methods_of};
 use crate::published_forms::{OWN_VANISHING_POINTS, PUBLISHED_MESH, RELATIVE_TWIST};
 use crate::report::document::{Block, Section, Table, number};
@@ -51,15 +52,14 @@ pub(crate) fn section(results: &Results) -> Section {
         results.catalogue.pitch.iter().filter(|one| one.pitch_deg == pitch).map(|one| one.set.clone()).collect()
     };
     let value = |variant: &str, pitch, measure| mean(&results.values_of_all(NAME, &sets_at(pitch), variant, measure));
-    for (measure, title) in [
-        ("theta_error_deg", "Error of the prior's turn, degrees"),
-        ("upright_deg", "Deviation from upright in the panorama, degrees"),
-        ("gdic_deg", "GDIC, degrees"),
-        ("ld", "LD x 1e-2"),
+    for (measure, id, title) in [
+        ("theta_error_deg", "theta-error-deg", "Error of the prior's turn, degrees"),
+        ("upright_deg", "upright-deg", "Deviation from upright in the panorama, degrees"),
+        ("gdic_deg", "gdic-deg", "GDIC, degrees"),
+        (LD, "ld", "LD x 1e-2"),
     ] {
         let columns = std::iter::once("method".to_owned()).chain(pitches.iter().map(|pitch| format!("{pitch:.0} deg")));
-        let mut table =
-            Table::new(&format!("pitch-{}", measure.replace('_', "-")), &format!("{title}, by pitch."), columns);
+        let mut table = Table::new(&format!("pitch-{id}"), &format!("{title}, by pitch."), columns);
         for (name, _) in variants() {
             let cells = pitches.iter().map(|pitch| number(value(name, *pitch, measure), 2));
             table.push(std::iter::once(name.to_owned()).chain(cells));

@@ -3,6 +3,7 @@
 use trueup::Result;
 use trueup_report::charts::{Chart, Series, SeriesMark};
 
+use crate::measure::LD;
 use crate::methods::{APAP, GSP_3D_PUBLISHED, SPHP, SPHP_FREE, VPG, VPG_PUBLISHED, method};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::Results;
@@ -93,7 +94,7 @@ pub(crate) fn section(results: &Results) -> Section {
     turns.dedup();
     for (measure, title, id) in [
         ("gdic_deg", "GDIC, degrees", "rolled-gdic"),
-        ("ld", "LD x 1e-2", "rolled-ld"),
+        (LD, "LD x 1e-2", "rolled-ld"),
         ("upright_deg", "Deviation from upright, degrees", "rolled-upright"),
     ] {
         let heads = ["scene".to_owned(), "method".to_owned()];

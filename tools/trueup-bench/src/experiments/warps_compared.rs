@@ -2,8 +2,9 @@
 
 use trueup::Result;
 
-use super::grid::{GridRow, id_of, table};
+use super::grid::{GridRow, table};
 use super::paper_figures::WARPS;
+use crate::measure::LD;
 use crate::methods::{APAP, ComparedMethod, Family, SPHP, SPHP_FREE, VPG, VPG_PUBLISHED, methods_of};
 use crate::report::document::{Block, Claim, Section, number};
 use crate::results::{Results, short_name};
@@ -156,7 +157,7 @@ fn claim_direction(results: &Results) -> Claim {
 /// VPG distorts less on every set, as in the paper.
 fn claim_distortion(results: &Results) -> Claim {
     let pairs: Vec<(&str, Vec<Pair>)> =
-        CLAIMED.iter().map(|name| (*name, same_photographs(results, name, VPG_PUBLISHED, "ld"))).collect();
+        CLAIMED.iter().map(|name| (*name, same_photographs(results, name, VPG_PUBLISHED, LD))).collect();
     let all: Vec<&Pair> = pairs.iter().flat_map(|(_, pairs)| pairs).collect();
     let lower = all.iter().filter(|pair| pair.vpg < pair.warp).count();
     let of_warp = |(name, pairs): &(&str, Vec<Pair>)| {
@@ -194,18 +195,13 @@ pub(crate) fn section(results: &Results) -> Section {
          reduced set."
     ));
     section.blocks.extend(claims(results).into_iter().map(Block::Claim));
-    for (measure, title) in [("ld", "LD x 1e-2"), ("gdic_deg", "GDIC, degrees")] {
+    for (measure, id, title) in [(LD, "ld", "LD x 1e-2"), ("gdic_deg", "gdic-deg", "GDIC, degrees")] {
         let mut rows: Vec<GridRow> = methods().map(|one| grid_row(results, &sets, one, measure)).collect();
         rows.extend(WARPS.iter().map(|row| match measure {
-            "ld" => GridRow::paper(row.method, &row.ld),
+            LD => GridRow::paper(row.method, &row.ld),
             _ => GridRow::paper(row.method, &row.gdic_deg),
         }));
-        section.blocks.push(Block::Table(table(
-            &format!("t1-{}", id_of(measure)),
-            &format!("T1: {title}."),
-            &sets,
-            &rows,
-        )));
+        section.blocks.push(Block::Table(table(&format!("t1-{id}"), &format!("T1: {title}."), &sets, &rows)));
     }
     let refused = refusals(results, &sets);
     if !refused.is_empty() {
@@ -297,8 +293,7 @@ mod tests {
         ];
         assert_eq!(refusals(&results, std::slice::from_ref(set)), expected);
         let one = method("quasi-homography").expect("a method");
-        let none =
-            table("t", "", std::slice::from_ref(set), &[grid_row(&results, std::slice::from_ref(set), one, "ld")]);
+        let none = table("t", "", std::slice::from_ref(set), &[grid_row(&results, std::slice::from_ref(set), one, LD)]);
         assert_eq!(none.rows[0].cells, ["quasi-homography", "n/a", "-"]);
         let held: Vec<Option<bool>> = claims(&results).iter().map(|claim| claim.holds).collect();
         assert_eq!(held, [Some(true), None]);

@@ -50,9 +50,10 @@ pub(crate) fn measures() -> Section {
          It shows the prior alone.",
         "**upright**, degrees: the angle between what stands vertical in the middle of a photograph and the panorama's vertical; \
          the mean over the photographs. Unlike GDIC it is absolute: a panorama that leans as a whole is not upright.",
-        "**LD**, local distortion, x 1e-2: how unevenly the cells of a photograph's grid are stretched where nothing overlaps, the \
-         mean per photograph, the worst photograph of a set (equations 12 and 13). It grows with the size of the cells: a method \
-         with finer cells has a lower LD for the same shape.",
+        "**LD**, local distortion, x 1e-2: how unevenly the cells of a photograph's grid are stretched that lie wholly where nothing \
+         overlaps, the mean per photograph, the worst photograph of a set (equations 12 and 13). It grows with the size of the cells: \
+         a method with finer cells has a lower LD for the same shape. Photographs whose cameras are not known are judged by the \
+         centers of their cells.",
         "**align**, source pixels: root mean square distance in the panorama between the two places of one point of the scene; known \
          where all photographs were taken from one place.",
         "**divergence**: how badly the photographs' vanishing points fit one Manhattan world (equation 15); 0 is perfect.",
