@@ -198,9 +198,10 @@ impl Lens {
         let square = undistorted.norm_squared();
         let held = square.min(self.limit * self.limit);
         let powers = [1, 2, 3, 4].map(|power| held.powi(power));
+        let (place, by_undistorted) = self.distorted_and_slope(undistorted);
         Some(LensDerivatives {
-            place: self.distorted(undistorted),
-            by_ray: self.by_ray_of(ray, undistorted),
+            place,
+            by_ray: by_undistorted * self.terms.projection.by_ray(ray, undistorted),
             by_radial: undistorted * SMatrix::<f64, 1, 4>::from_row_slice(&powers),
             by_tangential: Matrix2::new(2.0 * x * y, square + 2.0 * x * x, square + 2.0 * y * y, 2.0 * x * y),
         })
@@ -208,11 +209,8 @@ impl Lens {
 
     /// How the place of a ray moves with the ray's three entries; `None` as [`Self::place`].
     pub fn by_ray(&self, ray: Vector3<f64>) -> Option<Matrix2x3<f64>> {
-        self.terms.projection.place(ray).map(|undistorted| self.by_ray_of(ray, undistorted))
-    }
-
-    fn by_ray_of(&self, ray: Vector3<f64>, undistorted: Vector2<f64>) -> Matrix2x3<f64> {
-        self.by_undistorted(undistorted) * self.terms.projection.by_ray(ray, undistorted)
+        let undistorted = self.terms.projection.place(ray)?;
+        Some(self.distorted_and_slope(undistorted).1 * self.terms.projection.by_ray(ray, undistorted))
     }
 
     /// Factor of the radius r by the radial terms, slope and curvature of the distorted radius.
@@ -236,15 +234,16 @@ impl Lens {
         Vector2::new(2.0 * p1 * x * y + p2 * (square + 2.0 * x * x), p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y)
     }
 
-    /// The derivative of [`Self::distorted`].
-    fn by_undistorted(&self, undistorted: Vector2<f64>) -> Matrix2<f64> {
+    /// [`Self::distorted`] and its derivative.
+    fn distorted_and_slope(&self, undistorted: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let ([x, y], [p1, p2]) = (undistorted.into(), self.terms.tangential);
         let r = undistorted.norm();
         let Radial { factor, slope, .. } = self.radial(r);
         let outward = if r > 0.0 { undistorted / r } else { Vector2::zeros() };
         let radial = Matrix2::identity() * factor + outward * outward.transpose() * (slope - factor);
         let cross = 2.0 * (p1 * x + p2 * y);
-        radial + Matrix2::new(2.0 * p1 * y + 6.0 * p2 * x, cross, cross, 6.0 * p1 * y + 2.0 * p2 * x)
+        let aside = Matrix2::new(2.0 * p1 * y + 6.0 * p2 * x, cross, cross, 6.0 * p1 * y + 2.0 * p2 * x);
+        (undistorted * factor + self.aside(undistorted), radial + aside)
     }
 
     /// A radius near the one that is distorted to `wanted`: the first terms of the inverse's series, where they change it by
@@ -301,8 +300,9 @@ impl Lens {
         }
         undistorted -= self.aside(undistorted) / self.radial(r).factor;
         for _ in 0..MOST_STEPS {
-            let Some(inverse) = self.by_undistorted(undistorted).try_inverse() else { break };
-            let step = inverse * (place - self.distorted(undistorted));
+            let (reached, slope) = self.distorted_and_slope(undistorted);
+            let Some(inverse) = slope.try_inverse() else { break };
+            let step = inverse * (place - reached);
             undistorted += step;
             if step.norm() <= NEARLY_SETTLED * (1.0 + undistorted.norm()) {
                 break;
