@@ -8,9 +8,14 @@ pub(crate) const DECAY_PX: f64 = 72.25;
 /// Smallest weight of a match; it keeps vertices far from all matches determined.
 const WEIGHT_FLOOR: f64 = 0.0015;
 
-/// How many matches tell of a place (source pixels): the sum of their weights, each 1 at the place itself.
-pub(crate) fn matches_around(positions: &[Vector2<f64>], place: Vector2<f64>) -> f64 {
-    positions.iter().map(|position| weight_at((position - place).norm())).sum()
+/// Whether at least so many matches tell of a place (source pixels): by the sum of their weights, each 1 at the place itself. `least` is
+/// more than 0.
+pub(crate) fn are_told_around(positions: &[Vector2<f64>], place: Vector2<f64>, least: f64) -> bool {
+    let mut told = 0.0;
+    positions.iter().any(|position| {
+        told += weight_at((position - place).norm());
+        told >= least
+    })
 }
 
 /// The weight of a match at a distance, pixels.
@@ -173,7 +178,9 @@ mod tests {
     #[test]
     fn matches_count_by_how_near_they_are() {
         let positions = [Vector2::new(10.0, 20.0), Vector2::new(10.0 + DECAY_PX, 20.0), Vector2::new(1e4, 0.0)];
-        assert!((matches_around(&positions, Vector2::new(10.0, 20.0)) - 1.0 - (-1.0_f64).exp()).abs() < 1e-12);
+        let told = 1.0 + (-1.0_f64).exp();
+        let at_least = |least: f64| are_told_around(&positions, Vector2::new(10.0, 20.0), least);
+        assert!(at_least(told - 1e-12) && !at_least(told + 1e-12));
     }
 
     #[test]

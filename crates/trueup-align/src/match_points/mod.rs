@@ -157,7 +157,7 @@ impl Transfer<'_> {
         let by_matches = self.by_matches(frame);
         let mean = |(vertex, camera): (usize, Option<Vector2<f64>>)| {
             let (at, camera) = (grid.source(vertex), camera?);
-            let is_told = moving_dlt::matches_around(self.source, at) >= FIXING_MATCHES * share;
+            let is_told = moving_dlt::are_told_around(self.source, at, FIXING_MATCHES * share);
             is_told.then(|| by_matches(at).map_or(camera, |matches| camera.lerp(&matches, share)))
         };
         by_cameras.enumerate().map(mean).collect()
