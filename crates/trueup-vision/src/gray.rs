@@ -12,6 +12,10 @@ pub(crate) fn gray_at(gray: &Raster<u8>, point: Vector2<f64>) -> Option<f64> {
     }
     let (column, row) = (x as usize, y as usize);
     let (u, v) = (x - column as f64, y - row as f64);
-    let at = |dx: usize, dy: usize| f64::from(gray.pixel(column + dx, row + dy)[0]);
-    Some((at(0, 0) * (1.0 - u) + at(1, 0) * u) * (1.0 - v) + (at(0, 1) * (1.0 - u) + at(1, 1) * u) * v)
+    let channels = gray.channels();
+    let along = |row: usize| {
+        let pair = &gray.row(row)[column * channels..=(column + 1) * channels];
+        f64::from(pair[0]) * (1.0 - u) + f64::from(pair[channels]) * u
+    };
+    Some(along(row) * (1.0 - v) + along(row + 1) * v)
 }

@@ -137,11 +137,14 @@ impl Window {
         if !(is_inside(0) && is_inside(1)) {
             return None;
         }
-        let value = |point: &WindowPoint| gray_at(picture, place + shape * point.offset);
-        let mut values = WINDOW.points.iter().map(value).collect::<Option<Vec<f64>>>()?;
-        let mean: f64 = values.iter().zip(WINDOW.points.iter()).map(|(value, point)| point.weight * value).sum();
+        let points = &WINDOW.points;
+        let mut values = Vec::with_capacity(points.len());
+        for point in points {
+            values.push(gray_at(picture, place + shape * point.offset)?);
+        }
+        let mean: f64 = values.iter().zip(points).map(|(value, point)| point.weight * value).sum();
         values.iter_mut().for_each(|value| *value -= mean);
-        let contrast = values.iter().zip(WINDOW.points.iter()).map(|(value, point)| point.weight * value * value).sum();
+        let contrast = values.iter().zip(points).map(|(value, point)| point.weight * value * value).sum();
         Some(Self { values, contrast })
     }
 
