@@ -95,17 +95,18 @@ impl LineSupportRectangle {
         [self.center[0] + along * x - across * y, self.center[1] + along * y + across * x]
     }
 
-    /// Pixels whose center is inside, and how many of them are aligned with the direction.
-    fn count(&self, field: &GradientField, tangent: f32) -> (usize, usize) {
+    /// Pixels whose center is inside, and how many of them are aligned with the direction, by each of the tangents.
+    fn count<const N: usize>(&self, field: &GradientField, tangents: [f32; N]) -> (usize, [usize; N]) {
         let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(a, b)| self.point(self.along[a], self.across[b])[1]);
         let top = corners.iter().copied().fold(f64::INFINITY, f64::min) - BOUNDARY_SLACK_PX;
         let bottom = corners.iter().copied().fold(f64::NEG_INFINITY, f64::max) + BOUNDARY_SLACK_PX;
         let first_row = top.ceil().max(1.0) as usize;
         let last_row = bottom.floor().min(field.height() as f64).max(0.0) as usize;
         let direction = self.direction.map(|component| component as f32);
-        let (mut total, mut aligned) = (0, 0);
+        let sides = Sides::of(self);
+        let (mut total, mut aligned) = (0, [0; N]);
         for row in first_row..=last_row {
-            let (left, right) = self.row_interval(row as f64);
+            let (left, right) = sides.row_interval(row as f64);
             let first = left.ceil().max(1.0) as usize;
             let last = right.floor().min(field.width() as f64).max(0.0) as usize;
             if first > last {
@@ -113,51 +114,83 @@ impl LineSupportRectangle {
             }
             let start = row * field.stride();
             total += last - first + 1;
-            aligned += field.level_lines()[start + first..=start + last]
-                .iter()
-                .filter(|&&line| is_aligned(line, direction, tangent))
-                .count();
+            for &line in &field.level_lines()[start + first..=start + last] {
+                for (aligned, tangent) in aligned.iter_mut().zip(tangents) {
+                    *aligned += usize::from(is_aligned(line, direction, tangent));
+                }
+            }
         }
         (total, aligned)
     }
 
-    /// The columns of row `y` that are inside, as an interval that may be empty.
-    fn row_interval(&self, y: f64) -> (f64, f64) {
-        let dy = y - self.center[1];
-        let [x, slope] = self.direction;
-        // along = dx x + dy slope, across = dy x - dx slope: each bounds dx unless its factor vanishes.
-        let bounds = [(x, dy * slope, self.along), (-slope, dy * x, self.across)];
-        let (mut left, mut right) = (f64::NEG_INFINITY, f64::INFINITY);
-        for (factor, constant, interval) in bounds {
-            let [low, high] = [interval[0] - BOUNDARY_SLACK_PX - constant, interval[1] + BOUNDARY_SLACK_PX - constant];
-            if factor.abs() < f64::EPSILON {
-                if low > 0.0 || high < 0.0 {
-                    return (f64::INFINITY, f64::NEG_INFINITY);
-                }
-                continue;
-            }
-            let (a, b) = (low / factor, high / factor);
-            left = left.max(a.min(b));
-            right = right.min(a.max(b));
-        }
-        (left + self.center[0], right + self.center[0])
-    }
-
     fn significance(&self, field: &GradientField, false_alarms: &FalseAlarms) -> f64 {
         let precision = false_alarms.precision(self.halvings);
-        let (total, aligned) = self.count(field, precision.tangent);
+        let (total, [aligned]) = self.count(field, [precision.tangent]);
         false_alarms.significance(total, aligned, precision)
     }
 
-    fn finer(mut self) -> Option<Self> {
-        self.halvings += 1;
-        Some(self)
+    /// The rectangle at each of the next finer precisions, with its significance.
+    fn finer(self, field: &GradientField, false_alarms: &FalseAlarms) -> [(Self, f64); TRIES] {
+        let variants: [Self; TRIES] = std::array::from_fn(|k| Self { halvings: self.halvings + 1 + k, ..self });
+        let precisions = variants.map(|variant| false_alarms.precision(variant.halvings));
+        let (total, aligned) = self.count(field, precisions.map(|precision| precision.tangent));
+        std::array::from_fn(|k| (variants[k], false_alarms.significance(total, aligned[k], precisions[k])))
     }
 
     /// Cuts `first` off the one side and `second` off the other; `None` if too little would remain.
     fn narrower(mut self, first: f64, second: f64) -> Option<Self> {
         self.across = [self.across[0] + first, self.across[1] - second];
         (self.width() >= MIN_IMPROVED_WIDTH_PX).then_some(self)
+    }
+}
+
+/// Where the sides of a rectangle cross rows of pixels.
+struct Sides {
+    /// The rectangle's center.
+    center: [f64; 2],
+    /// Of a pixel `dx` columns and `dy` rows from the center, `dx factor + dy other` lies along the rectangle, and then across it, within a
+    /// range.
+    bounds: [Bound; 2],
+}
+
+/// See [`Sides::bounds`].
+struct Bound {
+    factor: f64,
+    /// One over it.
+    reciprocal: f64,
+    other: f64,
+    range: [f64; 2],
+}
+
+impl Sides {
+    fn of(rectangle: &LineSupportRectangle) -> Self {
+        let [x, slope] = rectangle.direction;
+        let bound = |factor: f64, other: f64, [low, high]: [f64; 2]| {
+            let range = [low - BOUNDARY_SLACK_PX, high + BOUNDARY_SLACK_PX];
+            Bound { factor, reciprocal: factor.recip(), other, range }
+        };
+        let bounds = [bound(x, slope, rectangle.along), bound(-slope, x, rectangle.across)];
+        Self { center: rectangle.center, bounds }
+    }
+
+    /// The columns of row `y` that are inside, as an interval that may be empty.
+    fn row_interval(&self, y: f64) -> (f64, f64) {
+        let dy = y - self.center[1];
+        let (mut left, mut right) = (f64::NEG_INFINITY, f64::INFINITY);
+        // Each bounds dx unless its factor vanishes.
+        for Bound { factor, reciprocal, other, range } in &self.bounds {
+            let [low, high] = range.map(|side| side - dy * other);
+            if factor.abs() < f64::EPSILON {
+                if low > 0.0 || high < 0.0 {
+                    return (f64::INFINITY, f64::NEG_INFINITY);
+                }
+                continue;
+            }
+            let (a, b) = (low * reciprocal, high * reciprocal);
+            left = greater(left, lesser(a, b));
+            right = lesser(right, greater(a, b));
+        }
+        (left + self.center[0], right + self.center[0])
     }
 }
 
@@ -191,26 +224,29 @@ pub(super) fn improve(
     enough: f64,
 ) -> (LineSupportRectangle, f64) {
     const HALF: f64 = 0.5 * WIDTH_STEP_PX;
-    let steps: [fn(LineSupportRectangle) -> Option<LineSupportRectangle>; 5] = [
-        LineSupportRectangle::finer,
-        |rectangle| rectangle.narrower(HALF, HALF),
-        |rectangle| rectangle.narrower(WIDTH_STEP_PX, 0.0),
-        |rectangle| rectangle.narrower(0.0, WIDTH_STEP_PX),
-        LineSupportRectangle::finer,
-    ];
+    /// What is cut off both sides in each try; `None` to try finer precisions.
+    const STEPS: [Option<[f64; 2]>; 5] =
+        [None, Some([HALF, HALF]), Some([WIDTH_STEP_PX, 0.0]), Some([0.0, WIDTH_STEP_PX]), None];
     let mut best = (rectangle, rectangle.significance(field, false_alarms));
-    for step in steps {
+    for step in STEPS {
         if best.1 > enough {
             break;
         }
-        let mut variant = best.0;
-        for _ in 0..TRIES {
-            let Some(next) = step(variant) else { break };
-            variant = next;
-            let significance = variant.significance(field, false_alarms);
-            if significance > best.1 {
-                best = (variant, significance);
+        let start = best.0;
+        let mut better = |variant: (LineSupportRectangle, f64)| {
+            if variant.1 > best.1 {
+                best = variant;
             }
+        };
+        let Some([first, second]) = step else {
+            start.finer(field, false_alarms).into_iter().for_each(better);
+            continue;
+        };
+        let mut variant = start;
+        for _ in 0..TRIES {
+            let Some(next) = variant.narrower(first, second) else { break };
+            variant = next;
+            better((variant, variant.significance(field, false_alarms)));
         }
     }
     best
@@ -241,7 +277,28 @@ mod tests {
             let expected = (1..=field.height())
                 .flat_map(|y| (1..=field.width()).map(move |x| (x, y)))
                 .filter(|&(x, y)| inside(x, y));
-            assert_eq!(rectangle.count(&field, 1.0), (expected.count(), 0), "{angle_deg} degrees");
+            assert_eq!(rectangle.count(&field, [1.0]), (expected.count(), [0]), "{angle_deg} degrees");
+        }
+    }
+
+    /// Waves that run another way at every place.
+    #[test]
+    fn several_precisions_count_as_each_by_itself() {
+        let wave = |k: usize| 100.0 + 90.0 * ((k % 60) as f32 * 0.21).sin() * ((k / 60) as f32 * 0.13).cos();
+        let picture = trueup_core::raster::Raster::from_data(60, 50, 1, (0..60 * 50).map(wave).collect());
+        let field = GradientField::new(&picture.expect("as many"));
+        let rectangle = LineSupportRectangle {
+            center: [28.2, 22.7],
+            direction: [0.8, 0.6],
+            along: [-18.0, 17.3],
+            across: [-7.5, 9.1],
+            halvings: 0,
+        };
+        let tangents = [1.2, 0.4, 0.2, 0.1];
+        let (total, aligned) = rectangle.count(&field, tangents);
+        assert!(aligned.is_sorted_by(|wider, finer| wider > finer) && aligned[0] < total, "{aligned:?} of {total}");
+        for (aligned, tangent) in aligned.into_iter().zip(tangents) {
+            assert_eq!(rectangle.count(&field, [tangent]), (total, [aligned]), "{tangent}");
         }
     }
 }
