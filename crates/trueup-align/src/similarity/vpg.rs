@@ -272,11 +272,14 @@ impl<'a> SceneDirections<'a> {
             Some(found) => Some(found.covariance),
             None => covariance_by_sectors(&self.vote, refinement, vertical),
         };
-        // A deviation that is not a number is no more than another: sectors count then.
-        let wider = |sectors: f64| sectors > deviation(&by_photographs) || deviation(&by_photographs).is_nan();
-        let counts = |sectors: f64| pooled || sectors > MAX_GUIDING_DEVIATION_DEG.to_radians();
-        let chosen = by_sectors.filter(|covariance| counts(deviation(covariance)) && wider(deviation(covariance)));
-        chosen.unwrap_or(by_photographs)
+        let photographs = deviation(&by_photographs);
+        let counts = |covariance: &Matrix3<f64>| {
+            let sectors = deviation(covariance);
+            // A deviation that is not a number is no more than another.
+            let wider = photographs.is_nan() || sectors > photographs;
+            wider && (pooled || sectors > MAX_GUIDING_DEVIATION_DEG.to_radians())
+        };
+        by_sectors.filter(counts).unwrap_or(by_photographs)
     }
 
     /// The vertical of lines weighed against what else is known of it; an error with that vertical if lines do not guide it, with the
