@@ -4,6 +4,8 @@
 //! covariance; the vertical is the direction of least summed squares, each in units of its own deviation, so that none is
 //! believed altogether or not at all.
 
+use std::borrow::Cow;
+
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use trueup_core::geometry::tangent_basis;
@@ -11,6 +13,7 @@ use trueup_core::statistics::greatest_deviation;
 
 use super::gate::CameraAngle;
 use super::gravity::MeanGravity;
+use super::vertical::improbability;
 use crate::far_horizon::FarHorizon;
 use crate::straightening::{Straightened, level_moment, straighten, straighten_with_pitch};
 
@@ -24,6 +27,9 @@ const FITTED: f64 = 2.0;
 /// How many of its deviations the cameras' level lies from the vertical when it counts for a quarter (Geman-McClure): nothing
 /// keeps photographers from tilting all photographs alike.
 const HELD_SCALE: f64 = 2.0;
+/// Largest angle that two cameras are rolled against each other by where both are held level, degrees. Reasoned: rolls scatter by 1 to 5 degrees, and what
+/// is turned on purpose is turned farther.
+const MAX_HELD_APART_DEG: f64 = 20.0;
 /// A far horizon farther from the vertical of lines that may guide than so many deviations of both is none: what lines agree on is seen as well, and in
 /// most scenes by more photographs.
 const MAX_HORIZON_DEVIATIONS: f64 = 4.0;
@@ -74,6 +80,17 @@ struct Say {
 }
 
 impl Say {
+    /// Of what was seen: `across` is what it tells of turns of `down` along the columns of its tangent basis, rad^-2.
+    ///
+    /// Along `down` itself it tells as much as it does least across: to turns by small angles that says nothing, and the opposite of what
+    /// was seen, which is orthogonal to the same tangents, is not as good.
+    fn seen(source: LevelSource, photographs: usize, down: Vector3<f64>, across: &Matrix2<f64>) -> Self {
+        let basis = tangent_basis(&down);
+        let least = across.symmetric_eigenvalues().min().max(0.0);
+        let information = basis * across * basis.transpose() + down * down.transpose() * least;
+        Self { source, photographs, down, moment: Matrix3::zeros(), information }
+    }
+
     /// What the squares of `down` are beyond those of its own vertical.
     fn squares_beyond(&self, down: &Vector3<f64>) -> f64 {
         let squares = |direction: &Vector3<f64>| direction.dot(&(self.moment * direction));
@@ -123,7 +140,7 @@ impl Say {
 pub(super) struct CameraLevel<'a> {
     /// The cameras' rotations, from the common frame to each camera.
     pub rotations: &'a [Matrix3<f64>],
-    /// By [`straighten`], as published.
+    /// By [`straighten`], as published, of the cameras that are held alike.
     pub straightened: Straightened,
     /// Down in the common frame, by the cameras, by recorded gravity and by the far horizon.
     pub down: Vector3<f64>,
@@ -135,14 +152,16 @@ pub(super) struct CameraLevel<'a> {
 }
 
 impl<'a> CameraLevel<'a> {
-    /// Of the cameras with what [`straighten_with_pitch`] expects of them, and of the mean of recorded gravity, if there is any.
+    /// Of the cameras with what [`straighten_with_pitch`] expects of them, but for few that were turned on purpose, and of the mean of recorded gravity, if
+    /// there is any.
     pub(super) fn new(rotations: &'a [Matrix3<f64>], pitch_prior: f64, gravity: Option<MeanGravity>) -> Self {
-        let level = straighten_with_pitch(rotations, pitch_prior);
+        let held = held_alike(rotations);
+        let level = straighten_with_pitch(&held, pitch_prior);
         let cameras = Say {
             source: LevelSource::Cameras,
-            photographs: rotations.len(),
+            photographs: held.len(),
             down: level,
-            moment: level_moment(rotations, pitch_prior) / roll_variance(rotations, &level),
+            moment: level_moment(&held, pitch_prior) / roll_variance(&held, &level),
             information: Matrix3::zeros(),
         };
         let gravity = gravity.map(|gravity| Say {
@@ -155,19 +174,15 @@ impl<'a> CameraLevel<'a> {
         let says: Vec<Say> = [Some(cameras), gravity].into_iter().flatten().collect();
         let has_gravity = gravity.is_some();
         let down = if has_gravity { combined(&says) } else { level };
-        Self { rotations, straightened: straighten(rotations), down, held: down, has_gravity, says }
+        Self { rotations, straightened: straighten(&held), down, held: down, has_gravity, says }
     }
 
     /// The same with a far horizon that was found.
     pub(super) fn with_horizon(self, horizon: &FarHorizon) -> Self {
         let mut says = self.says;
-        says.push(Say {
-            source: LevelSource::Horizon,
-            photographs: horizon.photographs,
-            down: horizon.down,
-            moment: Matrix3::zeros(),
-            information: horizon.information,
-        });
+        let basis = tangent_basis(&horizon.down);
+        let across = basis.tr_mul(&(horizon.information * basis));
+        says.push(Say::seen(LevelSource::Horizon, horizon.photographs, horizon.down, &across));
         let down = combined(&says);
         Self { down, says, ..self }
     }
@@ -195,7 +210,7 @@ impl<'a> CameraLevel<'a> {
         };
         let held = self.says.iter().filter(|say| say.source != LevelSource::Horizon);
         let squares: f64 = held.map(|say| say.squares_beyond(down)).sum();
-        let rolls = mean_square_roll(self.rotations, down).sqrt();
+        let rolls = held_roll(self.rotations, down);
         let pitch_is_untold = !self.has_gravity && self.rotations.len() == 2;
         Some(CameraAngle {
             angle: own.angle(down),
@@ -237,13 +252,7 @@ impl<'a> CameraLevel<'a> {
         // What is infinite tells nothing.
         let across = (basis.tr_mul(&(covariance * basis)) + least).try_inverse();
         let across = across.filter(|across| across.iter().all(|part| part.is_finite())).unwrap_or_default();
-        let lines_say = Say {
-            source: LevelSource::Lines,
-            photographs,
-            down: *lines,
-            moment: Matrix3::zeros(),
-            information: basis * across * basis.transpose(),
-        };
+        let lines_say = Say::seen(LevelSource::Lines, photographs, *lines, &across);
         let says: Vec<Say> = std::iter::once(lines_say).chain(self.says.iter().copied()).collect();
         let down = combined(&says);
         let evidence = evidence(&says, &down);
@@ -251,10 +260,38 @@ impl<'a> CameraLevel<'a> {
     }
 }
 
-/// Mean square in radians of the rolls of cameras if the vertical is `down`.
-pub(super) fn mean_square_roll(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> f64 {
-    let squares = rotations.iter().map(|rotation| (rotation * down).x.asin().powi(2));
-    squares.sum::<f64>() / rotations.len() as f64
+/// Most of the cameras, those that are held alike; all of them where no more than half are. Least squares would look for a vertical between the others and these.
+fn held_alike(rotations: &[Matrix3<f64>]) -> Cow<'_, [Matrix3<f64>]> {
+    // Somebody holds the camera level.
+    let candidates = rotations.iter().map(|rotation| rotation.row(1).transpose());
+    let costs = candidates.map(|down| (improbability(&down, rotations), down));
+    let Some((_, down)) = costs.min_by(|one, other| one.0.total_cmp(&other.0)) else { return Cow::Borrowed(rotations) };
+    let is_held = held(&rolls(rotations, &down));
+    let count = is_held.iter().filter(|&&is_held| is_held).count();
+    if count == rotations.len() || 2 * count <= rotations.len() {
+        return Cow::Borrowed(rotations);
+    }
+    rotations.iter().zip(is_held).filter_map(|(rotation, is_held)| is_held.then_some(*rotation)).collect()
+}
+
+/// Rolls in radians of cameras if the vertical is `down`.
+fn rolls(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> Vec<f64> {
+    rotations.iter().map(|rotation| (rotation * down).x.clamp(-1.0, 1.0).asin()).collect()
+}
+
+/// Whether cameras of such rolls are held as the one is that is rolled least.
+fn held(rolls: &[f64]) -> Vec<bool> {
+    let least = rolls.iter().copied().min_by(|one, other| one.abs().total_cmp(&other.abs())).unwrap_or(0.0);
+    rolls.iter().map(|roll| (roll - least).abs() <= MAX_HELD_APART_DEG.to_radians()).collect()
+}
+
+/// Root mean square in radians of the rolls of cameras if the vertical is `down`. Cameras that are rolled against the one that is rolled least by more
+/// than anybody who holds them level does were turned on purpose, whatever the vertical is, and are not counted.
+pub(super) fn held_roll(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> f64 {
+    let rolls = rolls(rotations, down);
+    let counted = rolls.iter().zip(held(&rolls)).filter(|(_, is_held)| *is_held);
+    let (squares, count) = counted.fold((0.0, 0.0), |(squares, count), (roll, _)| (squares + roll * roll, count + 1.0));
+    (squares / count).sqrt()
 }
 
 /// Variance of the cameras' rolls about `level`, of which two angles were fitted; with what is expected of photographers, which few
@@ -390,6 +427,42 @@ mod tests {
         assert!(level.down.angle(&Vector3::y()) < 1e-3, "{}", level.down);
         let shares: Vec<f64> = level.evidence().iter().map(|one| one.share).collect();
         assert!(shares[0] < 1e-3 && shares[1] > 0.999, "{shares:?}");
+    }
+
+    /// Two of three photographs stand upright, one lies on its side, and cameras expect a level that has nothing to do with either: whichever way it points,
+    /// the vertical of lines keeps its sense.
+    #[test]
+    fn lines_are_not_stood_on_their_head() {
+        let rolls = [0.0, std::f64::consts::FRAC_PI_2, 0.0];
+        let rotations: Vec<Matrix3<f64>> = rolls
+            .iter()
+            .zip([-0.5, 0.0, 0.5])
+            .map(|(&roll, yaw)| rotation_about_z(roll) * rotation_about_y(yaw))
+            .collect();
+        let level = CameraLevel::new(&rotations, PITCH_PRIOR, None);
+        for lines in [Vector3::y(), -Vector3::y()] {
+            let (down, _) = level.with_lines(&lines, &alike(0.002), 3);
+            assert!(down.angle(&lines) < 0.01, "{down}");
+        }
+    }
+
+    /// The level of two photographs is that of three of which the third lies on its side; of two turned against each other both count.
+    #[test]
+    fn who_turns_a_camera_on_purpose_does_not_tilt_the_level() {
+        let views = [-0.4, 0.4, 0.0].map(|yaw| rotation_about_x(0.05) * rotation_about_y(yaw));
+        let on_its_side = rotation_about_z(std::f64::consts::FRAC_PI_2) * views[2];
+        let level = |rotations: &[Matrix3<f64>]| CameraLevel::new(rotations, PITCH_PRIOR, None).down;
+        let turned = level(&[views[0], views[1], on_its_side]);
+        assert!(turned.angle(&level(&views[..2])) < 1e-12, "{turned}");
+        assert_eq!(held_alike(&[views[0], on_its_side]).len(), 2);
+    }
+
+    /// By hand: rolls of 0.02, -0.04 and, turned on purpose, 0.7.
+    #[test]
+    fn who_turns_a_camera_on_purpose_does_not_hold_it_askew() {
+        let rotations = [0.02, -0.04, 0.7].map(rotation_about_z);
+        let expected = ((0.02_f64.powi(2) + 0.04_f64.powi(2)) / 2.0).sqrt();
+        assert!((held_roll(&rotations, &Vector3::y()) - expected).abs() < 1e-12);
     }
 
     /// Lines 14 degrees from the cameras' level. Cameras whose level is sure to sqrt((2 e^2 / 4) / 2) = 1 degree cost at most 4, Geman and McClure's

@@ -5,8 +5,13 @@ use trueup_core::geometry::roll_from_down;
 
 use super::signed_permutation::match_triad;
 
-/// Difference of mean squared sines of the roll within which two directions stand equally upright in the photographs.
-const TIE: f64 = 0.05;
+/// Roll of cameras that are held level, degrees. Reasoned.
+const EXPECTED_ROLL_DEG: f64 = 5.0;
+/// How far photographs look up or down, degrees. Reasoned.
+const EXPECTED_PITCH_DEG: f64 = 25.0;
+/// Square of the roll, in expected ones, of a camera that was turned on purpose, by whatever angle. Reasoned: rarer than a photograph that looks up by 60
+/// degrees, more frequent than one of the zenith.
+const TURNED: f64 = 12.0;
 /// Sine of the angle to the viewing direction below which the vertical says nothing of the roll: sin 15 degrees.
 const MIN_SINE: f64 = 0.258_819_045_102_520_74;
 
@@ -15,33 +20,25 @@ const MIN_SINE: f64 = 0.258_819_045_102_520_74;
 ///
 /// # Departures
 /// The paper takes, in the reference camera's frame, the nearest world axis (eq. 5), without signs or a one-to-one
-/// rule; that fails for steep references. Here: the direction that would roll the photographs least, since people do not
-/// twist the camera: the mean of sin^2 of the roll, weighed by how far the direction lies from the line of sight, along
-/// which it has no roll; among near equals the one closer to the cameras' y axes. No reference takes part.
+/// rule; that fails for steep references. Here: the direction by which all cameras are most probably held, little rolled but for some that were turned on
+/// purpose, and about level. No reference takes part.
 pub(super) fn vertical_of(frame: &Matrix3<f64>, rotations: &[Matrix3<f64>]) -> Vector3<f64> {
-    let mut squared_x = [0.0; 3];
-    let mut squared_y = [0.0; 3];
-    let mut along_y = [0.0; 3];
-    let mut signed_y = [0.0; 3];
-    for rotation in rotations {
-        let in_camera = rotation * frame;
-        for k in 0..3 {
-            squared_x[k] += in_camera[(0, k)].powi(2);
-            squared_y[k] += in_camera[(1, k)].powi(2);
-            along_y[k] += in_camera[(1, k)].abs();
-            signed_y[k] += in_camera[(1, k)];
-        }
-    }
-    // What all photographs look along is no vertical.
-    let rolled: [f64; 3] = std::array::from_fn(|k| match squared_x[k] + squared_y[k] {
-        across if across > f64::EPSILON => squared_x[k] / across,
-        _ => 1.0,
-    });
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| rolled[a].total_cmp(&rolled[b]));
-    let tie = rolled[order[1]] - rolled[order[0]] < TIE && along_y[order[1]] > along_y[order[0]];
-    let vertical = if tie { order[1] } else { order[0] };
-    frame.column(vertical) * if signed_y[vertical] > 0.0 { 1.0 } else { -1.0 }
+    let improbabilities: [f64; 3] = std::array::from_fn(|k| improbability(&frame.column(k).into_owned(), rotations));
+    let order = |&a: &usize, &b: &usize| improbabilities[a].total_cmp(&improbabilities[b]);
+    let vertical = frame.column((0..3).min_by(order).unwrap_or(1)).into_owned();
+    let along_y: f64 = rotations.iter().map(|rotation| (rotation * vertical).y).sum();
+    if along_y > 0.0 { vertical } else { -vertical }
+}
+
+/// How improbably cameras are held if the vertical is `down` or its opposite: mean squares of their roll, of which none counts for more than
+/// [`TURNED`], and of how far they look up or down, each in units of what is expected of it.
+pub(super) fn improbability(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> f64 {
+    let square = |sine: f64, expected_deg: f64| (sine.clamp(-1.0, 1.0).asin() / expected_deg.to_radians()).powi(2);
+    let of_one = |rotation: &Matrix3<f64>| {
+        let seen = rotation * down;
+        square(seen.x, EXPECTED_ROLL_DEG).min(TURNED) + square(seen.z, EXPECTED_PITCH_DEG)
+    };
+    rotations.iter().map(of_one).sum::<f64>() / rotations.len() as f64
 }
 
 /// The column of `frame` that lies nearest to `expected`, or its opposite, whichever points the same way.
@@ -82,6 +79,18 @@ mod tests {
         let rotations = [rotation_about_y(-0.1), rotation_about_z(45_f64.to_radians()) * rotation_about_y(0.1)];
         let down = vertical_of(&Matrix3::identity(), &rotations);
         assert!(down.angle(&Vector3::y()) < 1e-12, "{down}");
+    }
+
+    /// One of two photographs is turned by a quarter, so that both rolls are as probable; by the depth of the scene as vertical they would look up by 70 and
+    /// 45 degrees.
+    #[test]
+    fn of_photographs_turned_against_each_other_those_that_look_level_tell() {
+        for turned_deg in [-90.0_f64, -75.0, 75.0, 90.0] {
+            let views = [20.0_f64, 45.0].map(|yaw_deg| rotation_about_y(yaw_deg.to_radians()));
+            let rotations = [rotation_about_z(0.03) * views[0], rotation_about_z(turned_deg.to_radians()) * views[1]];
+            let down = vertical_of(&Matrix3::identity(), &rotations);
+            assert!(down.angle(&Vector3::y()) < 1e-12, "{turned_deg}: {down}");
+        }
     }
 
     #[test]

@@ -12,14 +12,14 @@ use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
 use super::jackknife::{covariance_by_photographs, covariance_by_sectors, deviation};
 use super::joint::{self, AxisWeights, LineVote, Refinement};
-use super::level::{CameraLevel, mean_square_roll};
+use super::level::{CameraLevel, held_roll};
 use super::options::{GateMode, SimilarityOptions};
 use super::prior::{Guidance, VerticalSpread};
 use super::signed_permutation::{match_triad, triad_residual};
 use super::turns::{RollEvidence, solve_turns};
 use super::upright::Upright;
 use super::vertical::{roll_of, vertical_by_reference, vertical_near, vertical_of};
-use super::vertical_vote::vertical_peak;
+use super::vertical_vote::{SEARCH_DEG, vertical_peak};
 use super::witnesses::{Reconciled, reconciled};
 use crate::vanishing::{InterpretationPlanes, RefinedTriad};
 
@@ -81,7 +81,8 @@ pub(super) fn guide(
     let cut = if options.as_printed.dominant { f64::INFINITY } else { options.rejection };
     let dominant = dominant_frame(&scene.triads, cut, &mut generator);
     context.check_cancelled()?;
-    let pooled = options.pooled_search.then(|| search_frames(&scene.vote, &level.down)).flatten();
+    let about = dominant.as_ref().map_or(level.down, |dominant| scene.searched_about(dominant));
+    let pooled = options.pooled_search.then(|| search_frames(&scene.vote, &about)).flatten();
     let significance = pooled.as_ref().map(|pooled| pooled.significance);
     let allowed = allowed_divergence(count, significance, options);
     let mut guidance = Guidance { significance, ..Guidance::none(count, allowed, level.evidence()) };
@@ -142,6 +143,15 @@ impl<'a> SceneDirections<'a> {
         }
     }
 
+    /// About which vertical frames are sought of all lines together: the cameras', unless the vertical of `dominant` is out of reach from there and
+    /// the cameras know so little that it may be theirs, as of two photographs of which one lies on its side.
+    fn searched_about(&self, dominant: &Dominant) -> Vector3<f64> {
+        let own = self.vertical(&dominant.frame);
+        let out_of_reach = own.angle(&self.level.down) > SEARCH_DEG.to_radians();
+        let is_theirs = self.level.angle_to(&own).is_some_and(|found| !found.is_too_wide(false));
+        if out_of_reach && is_theirs { own } else { self.level.down }
+    }
+
     /// Photographs whose directions agree with `dominant`.
     fn inliers(&self, dominant: &Dominant) -> Vec<usize> {
         let agrees = |index: &usize| dominant.residuals[*index].is_some_and(|r| r <= self.options.rejection);
@@ -187,7 +197,7 @@ impl<'a> SceneDirections<'a> {
                 true => 0.0,
                 false => magnitudes.get(magnitudes.len().saturating_sub(1) / 2).copied().unwrap_or(f64::INFINITY),
             },
-            rolls: (!self.level.has_gravity).then(|| mean_square_roll(self.level.rotations, &down).sqrt()),
+            rolls: (!self.level.has_gravity).then(|| held_roll(self.level.rotations, &down)),
         };
         guidance.divergence = Some(evidence.divergence).filter(|divergence| divergence.is_finite());
         guidance.inlier_ratio = inliers.len() as f64 / photographs as f64;
