@@ -19,7 +19,8 @@ pub(super) struct GateEvidence {
     pub significance: Option<f64>,
     /// Median over the inliers of |alpha_i|, of two the lesser, radians.
     pub median_roll: f64,
-    /// Root mean square in radians of the rolls that the photographs would have, of those that were held alike; `None` where recorded gravity tells, so that nothing is expected of them.
+    /// Root mean square in radians of the rolls that the photographs would have, of those that were held alike; `None` where recorded gravity tells, so that
+    /// nothing is expected of them.
     pub rolls: Option<f64>,
 }
 
@@ -30,8 +31,8 @@ pub(super) struct CameraAngle {
     pub angle: f64,
     /// In standard deviations of the cameras' own vertical, as their rolls, and gravity that they recorded, leave it.
     pub deviations: f64,
-    /// Root mean square of the photographs' rolls by it in radians, of those that were held alike, where nothing but the expectation that they look level tells how far up or down they
-    /// look; `None` elsewhere.
+    /// Root mean square of the photographs' rolls by it in radians, of those that were held alike, where nothing but the expectation that they look level tells
+    /// how far up or down they look; `None` elsewhere.
     pub rolls: Option<f64>,
 }
 

@@ -4,8 +4,6 @@
 //! covariance; the vertical is the direction of least summed squares, each in units of its own deviation, so that none is
 //! believed altogether or not at all.
 
-use std::borrow::Cow;
-
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use trueup_core::geometry::tangent_basis;
@@ -13,7 +11,7 @@ use trueup_core::statistics::greatest_deviation;
 
 use super::gate::CameraAngle;
 use super::gravity::MeanGravity;
-use super::vertical::improbability;
+use super::held::{held_alike, held_roll};
 use crate::far_horizon::FarHorizon;
 use crate::straightening::{Straightened, level_moment, straighten, straighten_with_pitch};
 
@@ -27,9 +25,6 @@ const FITTED: f64 = 2.0;
 /// How many of its deviations the cameras' level lies from the vertical when it counts for a quarter (Geman-McClure): nothing
 /// keeps photographers from tilting all photographs alike.
 const HELD_SCALE: f64 = 2.0;
-/// Largest angle that two cameras are rolled against each other by where both are held level, degrees. Reasoned: rolls scatter by 1 to 5 degrees, and what
-/// is turned on purpose is turned farther.
-const MAX_HELD_APART_DEG: f64 = 20.0;
 /// A far horizon farther from the vertical of lines that may guide than so many deviations of both is none: what lines agree on is seen as well, and in
 /// most scenes by more photographs.
 const MAX_HORIZON_DEVIATIONS: f64 = 4.0;
@@ -260,40 +255,6 @@ impl<'a> CameraLevel<'a> {
     }
 }
 
-/// Most of the cameras, those that are held alike; all of them where no more than half are. Least squares would look for a vertical between the others and these.
-fn held_alike(rotations: &[Matrix3<f64>]) -> Cow<'_, [Matrix3<f64>]> {
-    // Somebody holds the camera level.
-    let candidates = rotations.iter().map(|rotation| rotation.row(1).transpose());
-    let costs = candidates.map(|down| (improbability(&down, rotations), down));
-    let Some((_, down)) = costs.min_by(|one, other| one.0.total_cmp(&other.0)) else { return Cow::Borrowed(rotations) };
-    let is_held = held(&rolls(rotations, &down));
-    let count = is_held.iter().filter(|&&is_held| is_held).count();
-    if count == rotations.len() || 2 * count <= rotations.len() {
-        return Cow::Borrowed(rotations);
-    }
-    rotations.iter().zip(is_held).filter_map(|(rotation, is_held)| is_held.then_some(*rotation)).collect()
-}
-
-/// Rolls in radians of cameras if the vertical is `down`.
-fn rolls(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> Vec<f64> {
-    rotations.iter().map(|rotation| (rotation * down).x.clamp(-1.0, 1.0).asin()).collect()
-}
-
-/// Whether cameras of such rolls are held as the one is that is rolled least.
-fn held(rolls: &[f64]) -> Vec<bool> {
-    let least = rolls.iter().copied().min_by(|one, other| one.abs().total_cmp(&other.abs())).unwrap_or(0.0);
-    rolls.iter().map(|roll| (roll - least).abs() <= MAX_HELD_APART_DEG.to_radians()).collect()
-}
-
-/// Root mean square in radians of the rolls of cameras if the vertical is `down`. Cameras that are rolled against the one that is rolled least by more
-/// than anybody who holds them level does were turned on purpose, whatever the vertical is, and are not counted.
-pub(super) fn held_roll(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> f64 {
-    let rolls = rolls(rotations, down);
-    let counted = rolls.iter().zip(held(&rolls)).filter(|(_, is_held)| *is_held);
-    let (squares, count) = counted.fold((0.0, 0.0), |(squares, count), (roll, _)| (squares + roll * roll, count + 1.0));
-    (squares / count).sqrt()
-}
-
 /// Variance of the cameras' rolls about `level`, of which two angles were fitted; with what is expected of photographers, which few
 /// photographs do not refute.
 fn roll_variance(rotations: &[Matrix3<f64>], level: &Vector3<f64>) -> f64 {
@@ -429,8 +390,8 @@ mod tests {
         assert!(shares[0] < 1e-3 && shares[1] > 0.999, "{shares:?}");
     }
 
-    /// Two of three photographs stand upright, one lies on its side, and cameras expect a level that has nothing to do with either: whichever way it points,
-    /// the vertical of lines keeps its sense.
+    /// Two of three photographs stand upright, one lies on its side: whichever way the vertical of lines points, with the cameras' level or against it, it
+    /// keeps its sense.
     #[test]
     fn lines_are_not_stood_on_their_head() {
         let rolls = [0.0, std::f64::consts::FRAC_PI_2, 0.0];
@@ -455,14 +416,6 @@ mod tests {
         let turned = level(&[views[0], views[1], on_its_side]);
         assert!(turned.angle(&level(&views[..2])) < 1e-12, "{turned}");
         assert_eq!(held_alike(&[views[0], on_its_side]).len(), 2);
-    }
-
-    /// By hand: rolls of 0.02, -0.04 and, turned on purpose, 0.7.
-    #[test]
-    fn who_turns_a_camera_on_purpose_does_not_hold_it_askew() {
-        let rotations = [0.02, -0.04, 0.7].map(rotation_about_z);
-        let expected = ((0.02_f64.powi(2) + 0.04_f64.powi(2)) / 2.0).sqrt();
-        assert!((held_roll(&rotations, &Vector3::y()) - expected).abs() < 1e-12);
     }
 
     /// Lines 14 degrees from the cameras' level. Cameras whose level is sure to sqrt((2 e^2 / 4) / 2) = 1 degree cost at most 4, Geman and McClure's

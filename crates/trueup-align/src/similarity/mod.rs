@@ -14,6 +14,7 @@ mod gate;
 mod gravity;
 mod gsp_2d;
 mod gsp_3d;
+mod held;
 mod input;
 mod jackknife;
 mod joint;

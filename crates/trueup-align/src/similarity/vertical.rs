@@ -3,15 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::geometry::roll_from_down;
 
+use super::held::improbability;
 use super::signed_permutation::match_triad;
 
-/// Roll of cameras that are held level, degrees. Reasoned.
-const EXPECTED_ROLL_DEG: f64 = 5.0;
-/// How far photographs look up or down, degrees. Reasoned.
-const EXPECTED_PITCH_DEG: f64 = 25.0;
-/// Square of the roll, in expected ones, of a camera that was turned on purpose, by whatever angle. Reasoned: rarer than a photograph that looks up by 60
-/// degrees, more frequent than one of the zenith.
-const TURNED: f64 = 12.0;
 /// Sine of the angle to the viewing direction below which the vertical says nothing of the roll: sin 15 degrees.
 const MIN_SINE: f64 = 0.258_819_045_102_520_74;
 
@@ -28,17 +22,6 @@ pub(super) fn vertical_of(frame: &Matrix3<f64>, rotations: &[Matrix3<f64>]) -> V
     let vertical = frame.column((0..3).min_by(order).unwrap_or(1)).into_owned();
     let along_y: f64 = rotations.iter().map(|rotation| (rotation * vertical).y).sum();
     if along_y > 0.0 { vertical } else { -vertical }
-}
-
-/// How improbably cameras are held if the vertical is `down` or its opposite: mean squares of their roll, of which none counts for more than
-/// [`TURNED`], and of how far they look up or down, each in units of what is expected of it.
-pub(super) fn improbability(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> f64 {
-    let square = |sine: f64, expected_deg: f64| (sine.clamp(-1.0, 1.0).asin() / expected_deg.to_radians()).powi(2);
-    let of_one = |rotation: &Matrix3<f64>| {
-        let seen = rotation * down;
-        square(seen.x, EXPECTED_ROLL_DEG).min(TURNED) + square(seen.z, EXPECTED_PITCH_DEG)
-    };
-    rotations.iter().map(of_one).sum::<f64>() / rotations.len() as f64
 }
 
 /// The column of `frame` that lies nearest to `expected`, or its opposite, whichever points the same way.
