@@ -126,8 +126,10 @@ fn runs(count: usize, same: &BTreeMap<(usize, usize), SameView>) -> Vec<Vec<Foun
         // Whatever the first reaches within the photographs that follow, as long as none between is left out.
         let mut reached: BTreeMap<usize, FoundMember> =
             BTreeMap::from([(first, FoundMember { photograph: first, stops: 0.0, shift: [0.0; 2], is_sure: false })]);
-        // The surest links first; every round joins one photograph.
-        while let Some(member) = surest_link(&reached, same) {
+        // The surest links first; every round joins one photograph. Those before the first are of other runs, also where one that lies between
+        // parted them from these.
+        let following = same.range((first, first)..);
+        while let Some(member) = surest_link(&reached, following.clone()) {
             reached.insert(member.photograph, member);
         }
         let run: Vec<FoundMember> = reached
@@ -143,9 +145,9 @@ fn runs(count: usize, same: &BTreeMap<(usize, usize), SameView>) -> Vec<Vec<Foun
 }
 
 /// The photograph that is joined most surely to one that is `reached`, and where it stands.
-fn surest_link(
+fn surest_link<'a>(
     reached: &BTreeMap<usize, FoundMember>,
-    same: &BTreeMap<(usize, usize), SameView>,
+    same: impl Iterator<Item = (&'a (usize, usize), &'a SameView)>,
 ) -> Option<FoundMember> {
     let link = |(&(a, b), view): (&(usize, usize), &SameView)| {
         let (known, other, sign) = match (reached.get(&a), reached.get(&b)) {
@@ -157,7 +159,7 @@ fn surest_link(
         let stops = known.stops + sign * view.stops;
         Some((view.correlation, FoundMember { photograph: other, stops, shift, is_sure: view.is_sure() }))
     };
-    let surest = same.iter().filter_map(link).max_by(|one, other| one.0.total_cmp(&other.0));
+    let surest = same.filter_map(link).max_by(|one, other| one.0.total_cmp(&other.0));
     surest.map(|(_, member)| member)
 }
 

@@ -105,6 +105,17 @@ fn equal_exposures_other_views_and_other_cameras_are_no_stack() {
     assert_eq!((of([0, 0]), of([0, 1])), (1, 0));
 }
 
+/// A view that comes back after another one was a link to what is no run any more, which the search followed without end.
+#[test]
+fn a_view_that_comes_back_after_another_is_no_stack_and_the_next_one_is() {
+    let [near, far] = [[0.0; 3], [0.0, 0.9, 0.0]];
+    assert!(found(&[(near, 1.0), (far, 1.0), (HAND[1], 4.0)]).is_empty());
+    let stacks = found(&[(near, 1.0), (far, 1.0), (HAND[1], 4.0), (HAND[2], 0.25)]);
+    let numbers: Vec<(usize, usize)> =
+        stacks.iter().map(|stack| (stack.reference, stack.others[0].photograph)).collect();
+    assert!(matches!(numbers[..], [(2, 3) | (3, 2)]), "{numbers:?}");
+}
+
 /// Recorded exposures of 2 stops apart agree with pictures that are; one exposure, and one of the other sign, do not.
 #[test]
 fn what_cameras_recorded_has_a_voice() {
