@@ -133,6 +133,14 @@ impl Flat {
         }
     }
 
+    /// The longitude of a direction on a projection that ends at half a turn without closing there; `None` for all others.
+    pub(super) fn longitude_from_cut(&self, direction: &Vector3<f64>) -> Option<f64> {
+        match self.kind {
+            FlatKind::Fitted => self.fit.longitude_from_cut(direction),
+            _ => None,
+        }
+    }
+
     /// The unit direction of a place; `None` if none goes there.
     pub fn direction(&self, place: Vector2<f64>) -> Option<Vector3<f64>> {
         let [[x, y]] = place.data.0;

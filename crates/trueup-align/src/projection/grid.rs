@@ -1,6 +1,6 @@
 //! Grids on a projection's plane.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
@@ -38,6 +38,11 @@ pub struct PlacedGrid {
 const LARGEST_SAG_PX: f64 = 0.3;
 /// Radians beyond the view's end that are drawn: whole cells lie across its border then.
 const MARGIN: f64 = 0.09;
+/// Photograph pixels that a cell across the cut of a view may be long: it is not drawn, so much of the view's end is missing.
+const ACROSS_CUT_PX: f64 = 4.0;
+/// Radians of longitude. A cell with a wider side may go round a pole: of the four sides of one that does, the widest is a quarter of the turn or
+/// more. Such a cell lies in no sector and leaves a hole of its size.
+const WIDEST: f64 = 0.45 * PI;
 
 /// Places every photograph's grid.
 ///
@@ -113,11 +118,8 @@ impl<'a> Drawing<'a> {
     }
 
     /// How far the middle of two vertices' places is from the place of the pixel between, in pixels; `None` where there
-    /// is nothing to see.
+    /// is nothing to see. Across the cut of a view that does not close, as far as the cell is to be divided.
     fn sag(&self, from: DrawnVertex, to: DrawnVertex) -> Option<f64> {
-        /// A cell with a wider side on the turn may go round a pole: of the four sides of one that does, the widest is a quarter of the turn
-        /// or more. Such a cell lies in no sector and leaves a hole of its size.
-        const WIDEST: f64 = 0.45 * PI;
         let flat = &self.placement.view.flat;
         let pixel = (from.pixel + to.pixel) / 2.0;
         let (start, mut end, mut true_place) = (from.place?, to.place?, self.place(pixel)?);
@@ -127,6 +129,15 @@ impl<'a> Drawing<'a> {
             if (end.x - start.x).abs() > WIDEST {
                 return Some(f64::INFINITY);
             }
+        } else if let [Some(start), Some(end)] = [from, to].map(|vertex| self.longitude_from_cut(vertex.pixel)) {
+            let turn = wrap_angle(end - start);
+            if turn.abs() > WIDEST {
+                return Some(f64::INFINITY);
+            }
+            if (start + turn).abs() > PI {
+                let length = (to.pixel - from.pixel).norm() / ACROSS_CUT_PX;
+                return (length > 1.0).then(|| sag_of_pieces(length));
+            }
         }
         let middle = (start + end) / 2.0;
         let on_canvas = (middle - true_place).norm() * self.placement.canvas_from_plane;
@@ -134,6 +145,11 @@ impl<'a> Drawing<'a> {
             direction.angle(&self.direction(pixel)) * self.photograph.camera.focal_px
         });
         Some(on_canvas.min(in_photograph))
+    }
+
+    /// See [`Flat::longitude_from_cut`](super::Flat::longitude_from_cut).
+    fn longitude_from_cut(&self, pixel: Vector2<f64>) -> Option<f64> {
+        self.placement.view.flat.longitude_from_cut(&self.direction(pixel))
     }
 
     /// Lines close enough that cells follow the projection's curves.
@@ -204,8 +220,17 @@ impl<'a> Drawing<'a> {
         const NOWHERE: [f64; 2] = [f64::NAN; 2];
         let view = self.placement.view;
         if !view.flat.kind.turns() {
-            let target = places.iter().map(|place| place.map_or(NOWHERE, Into::into)).collect();
-            return vec![grid(target)].into_iter().filter(|mesh| mesh.whole_cells().next().is_some()).collect();
+            let target: Vec<[f64; 2]> = places.iter().map(|place| place.map_or(NOWHERE, Into::into)).collect();
+            let parts = match self.sides_of_cut(&lines) {
+                None => vec![target],
+                Some(sides) => {
+                    let on_side = |is_on: Vec<bool>| {
+                        target.iter().zip(is_on).map(|(&place, is_on)| if is_on { place } else { NOWHERE }).collect()
+                    };
+                    sides.map(on_side).into()
+                }
+            };
+            return parts.into_iter().map(grid).filter(|mesh| mesh.whole_cells().next().is_some()).collect();
         }
         let mut grids = Vec::new();
         for (center, half) in self.sectors(&places) {
@@ -233,6 +258,18 @@ impl<'a> Drawing<'a> {
         grids
     }
 
+    /// Which vertices are drawn to the right, and which to the left of the middle, where a view does not close and the photograph reaches beyond both
+    /// of its ends; `None` where it does not. Cells narrower than [`WIDEST`] are whole on a side, those across the cut on none.
+    fn sides_of_cut(&self, lines: &GridLines) -> Option<[Vec<bool>; 2]> {
+        let columns = lines.columns.len();
+        let longitude = |vertex: usize| self.longitude_from_cut(self.pixel(lines, vertex / columns, vertex % columns));
+        let longitudes: Vec<f64> = (0..columns * lines.rows.len()).map(longitude).collect::<Option<_>>()?;
+        let is_behind = |side: f64| longitudes.iter().any(|longitude| longitude * side > FRAC_PI_2);
+        let reach = WIDEST / 2.0;
+        let on_side = |side: f64| longitudes.iter().map(|longitude| longitude * side >= -reach).collect();
+        (is_behind(1.0) && is_behind(-1.0)).then(|| [1.0, -1.0].map(on_side))
+    }
+
     /// The longitudes around which the photograph is unrolled, and how far to both sides: its own middle, or four
     /// directions around a pole that it shows or all but shows. Sectors overlap by a quarter turn, so that each cell
     /// narrower than that is whole in one of them.
@@ -253,6 +290,12 @@ impl<'a> Drawing<'a> {
     }
 }
 
+/// The sag of an interval that is to be divided into so many pieces.
+fn sag_of_pieces(pieces: f64) -> f64 {
+    // The sag falls with the square of the length.
+    0.5 * LARGEST_SAG_PX * pieces.powi(2)
+}
+
 /// Lines with every interval divided that sags too much and is longer than `shortest`.
 fn divided(lines: &[f64], sags: &[f64], shortest: f64) -> Vec<f64> {
     /// Largest number of pieces in one round.
@@ -260,8 +303,7 @@ fn divided(lines: &[f64], sags: &[f64], shortest: f64) -> Vec<f64> {
     let mut finer = vec![lines[0]];
     for (pair, &sag) in lines.windows(2).zip(sags) {
         let length = pair[1] - pair[0];
-        // The sag falls with the square of the length.
-        let pieces = (sag / (0.5 * LARGEST_SAG_PX)).sqrt().ceil().min(PIECES).min((length / shortest).floor()).max(1.0);
+        let pieces = (sag / sag_of_pieces(1.0)).sqrt().ceil().min(PIECES).min((length / shortest).floor()).max(1.0);
         for piece in 1..pieces as usize {
             finer.push(pair[0] + length * piece as f64 / pieces);
         }
@@ -276,6 +318,7 @@ mod tests {
     use trueup_core::geometry::{rotation_about_x, rotation_about_y};
 
     use super::super::coverage::tests::photograph;
+    use super::super::fitted::Fit;
     use super::super::flat::{Flat, FlatKind};
     use super::*;
 
@@ -389,6 +432,44 @@ mod tests {
                     .iter()
                     .any(|cell| (0..4).all(|k| (cell[(k + 1) % 4] - cell[k]).perp(&(place - cell[k])) >= 0.0));
                 assert!(is_covered, "{degrees} degrees, {rows} px from the pole: no cell");
+            }
+        }
+    }
+
+    /// Photographs of what is behind and of the zenith, on a view that ends at half a turn: cells across its end were divided to the sixteenth of
+    /// a pixel, millions of them, and drawn all over the view. What lies near the end, up to four pixels of the photograph, is there, on both sides.
+    #[test]
+    fn a_view_that_does_not_close_is_cut_behind() {
+        for (turned, yaw_deg, pitch_deg) in [(false, 180.0, 70.0), (false, 10.0, 87.0), (true, 180.0, 3.0)] {
+            let flat = Flat::fitted(Fit { round: 1.6, upright: 0.2, turned });
+            let view = ProjectionView { flat, shown: Some([[-20.0; 2], [20.0; 2]]), ..view(FlatKind::Fitted) };
+            let grids = placed(&[photograph(yaw_deg, pitch_deg)], &view, false);
+            assert_eq!(grids.len(), 2);
+            assert!(grids.iter().all(|grid| grid.mesh.len() < 60_000), "{}", grids[0].mesh.len());
+            let cells: Vec<[Vector2<f64>; 4]> = grids
+                .iter()
+                .flat_map(|PlacedGrid { mesh, .. }| {
+                    mesh.whole_cells().map(|corners| corners.map(|vertex| mesh.target[vertex].into()))
+                })
+                .collect();
+            let along = if turned { Vector2::y() } else { Vector2::x() };
+            let end = Flat::fitted(Fit { turned: false, ..flat.fit }).reach([PI, 0.0]).x;
+            for cell in &cells {
+                let [low, high] = [f64::min, f64::max]
+                    .map(|most| cell.iter().map(|corner| corner.dot(&along)).reduce(most).expect("four corners"));
+                assert!(high - low < end, "{low} to {high} of {end}");
+            }
+            for from_middle in [-178.0, -170.0, 170.0, 178.0_f64] {
+                let (sine, cosine) = from_middle.to_radians().sin_cos();
+                // The zenith's photograph reaches down to 70 degrees behind.
+                let up = if turned { 0.0 } else { -75_f64.to_radians().tan() };
+                let direction = if turned { Vector3::new(up, sine, cosine) } else { Vector3::new(sine, up, cosine) };
+                let place = flat.place(direction).expect("within the view");
+                let is_in = |cell: &[Vector2<f64>; 4]| {
+                    let turns = [0, 1, 2, 3].map(|k| (cell[(k + 1) % 4] - cell[k]).perp(&(place - cell[k])));
+                    turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
+                };
+                assert!(cells.iter().any(is_in), "{from_middle} degrees, {turned}");
             }
         }
     }

@@ -31,6 +31,8 @@ const MORE_SIZE: f64 = 1.31;
 const BEYOND: f64 = 0.03;
 /// Sizes beyond which a view by itself shows nothing more: as for the named projections, about three times the middle's.
 const SHOWN_SIZE: f64 = 3.0;
+/// How much longer than wide a view by itself shows anything: beside a pole, 75 degrees up and more, what is drawn on a cylinder becomes streaks.
+const SHOWN_RATIO: f64 = 4.0;
 /// Half angles, radians (80 and 180 degrees), between which sizes have to grow more and more even: what lies behind the
 /// viewer is not the side of a view, and a turn whose ends meet must be even.
 const EVENING: [f64; 2] = [1.396, PI];
@@ -141,7 +143,8 @@ impl Seen {
         /// Beyond the samples, as a share of the window: what lies between them, bulging.
         const ASIDE: f64 = 0.02;
         let places = self.directions.iter().filter_map(|direction| {
-            let shown = stretch(flat, direction).is_some_and(|stretch| stretch.size <= SHOWN_SIZE);
+            let shown = stretch(flat, direction)
+                .is_some_and(|stretch| stretch.size <= SHOWN_SIZE && stretch.ratio <= SHOWN_RATIO);
             flat.place(*direction).filter(|_| shown)
         });
         let (low, high) = places.fold(None, |all: Option<(Vector2<f64>, Vector2<f64>)>, place| {

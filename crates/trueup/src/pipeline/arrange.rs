@@ -322,14 +322,15 @@ fn report_cut(
 ) {
     let size = [drawn.width, drawn.height].map(|length| length as f64);
     for placed in &plane.placed {
-        let shown = || drawn.placed.iter().filter(|other| other.photograph == placed.photograph);
+        let drawn_of_it = drawn.placed.iter().filter(|other| other.photograph == placed.photograph);
+        let shown: Vec<&GridMesh> = drawn_of_it.map(|other| &other.mesh).collect();
         let subject = Subject::Photograph(placed.photograph);
         let hint = "Choose an equirectangular projection, widen projection.fov, or turn the view (yaw, pitch).";
-        if shown().next().is_none() {
+        if shown.is_empty() {
             let message = format!("it lies outside of the {} view and is not shown", view.flat.kind.name());
             context.report(Diagnostic::warning("projection-left-out", subject.clone(), message, hint));
         } else if !view.flat.kind.turns() && options.projection.fov == 0.0 {
-            let outside = shown().map(|other| share_outside(&other.mesh, size)).fold(1.0, f64::min);
+            let outside = share_outside(&shown, size);
             /// Less than this is a corner.
             const NOTABLE: f64 = 0.02;
             if outside > NOTABLE {
@@ -345,8 +346,9 @@ fn report_cut(
     }
 }
 
-/// Share of the grid's vertices that lie outside of a canvas.
-fn share_outside(mesh: &GridMesh, size: [f64; 2]) -> f64 {
+/// Share of a photograph that lies outside of a canvas on each of its grids, which are divided alike.
+fn share_outside(grids: &[&GridMesh], size: [f64; 2]) -> f64 {
+    let Some(mesh) = grids.first() else { return 1.0 };
     // Vertices lie closer where the projection bends more; each counts for the photograph around it.
     let weight = |vertex: usize| {
         let (row, column) = (vertex / mesh.columns, vertex % mesh.columns);
@@ -355,9 +357,10 @@ fn share_outside(mesh: &GridMesh, size: [f64; 2]) -> f64 {
         let high = at((row + 1).min(mesh.rows - 1), (column + 1).min(mesh.columns - 1));
         (high - low).product()
     };
+    let is_on_canvas = |place: [f64; 2]| (0..2).all(|axis| (0.0..=size[axis]).contains(&place[axis]));
     let (mut outside, mut all) = (0.0, 0.0);
     for vertex in 0..mesh.len() {
-        let shown = (0..2).all(|axis| (0.0..=size[axis]).contains(&mesh.target[vertex][axis]));
+        let shown = grids.iter().any(|grid| grid.target.get(vertex).is_some_and(|&place| is_on_canvas(place)));
         all += weight(vertex);
         outside += if shown { 0.0 } else { weight(vertex) };
     }
@@ -367,6 +370,24 @@ fn share_outside(mesh: &GridMesh, size: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of five columns of vertices the first three lie on one grid, the third and fourth on the other, and the last on none.
+    #[test]
+    fn a_photograph_on_both_sides_of_a_view_is_shown_on_each() {
+        let whole = GridMesh::regular(40.0, 10.0, 10.0);
+        let part = |columns: std::ops::Range<usize>| {
+            let place = |(vertex, &place): (usize, &[f64; 2])| {
+                if columns.contains(&(vertex % whole.columns)) { place } else { [f64::NAN; 2] }
+            };
+            GridMesh { target: whole.target.iter().enumerate().map(place).collect(), ..whole.clone() }
+        };
+        let (left, right) = (part(0..3), part(2..4));
+        // By hand: columns weigh 1, 2, 2, 2 and 1 eighths.
+        for (grids, expected) in [(vec![&whole], 0.0), (vec![&left], 0.375), (vec![&left, &right], 0.125)] {
+            assert!((share_outside(&grids, [40.0, 10.0]) - expected).abs() < 1e-12, "{expected}");
+        }
+        assert_eq!(share_outside(&[], [40.0, 10.0]), 1.0);
+    }
 
     #[test]
     fn a_single_photograph_has_no_projection() {
