@@ -83,7 +83,7 @@ pub fn run(input: &ExposureInput<'_>, options: &ExposureOptions, context: &Stage
             Ok((first + 1..count)
                 .filter_map(|second| {
                     let samples = shared(&patches[first], &patches[second], turn);
-                    compare(samples, [first, second], thumbnails[first].curve)
+                    compare(&samples, [first, second], thumbnails[first].curve)
                 })
                 .collect::<Vec<_>>())
         })
@@ -91,6 +91,7 @@ pub fn run(input: &ExposureInput<'_>, options: &ExposureOptions, context: &Stage
         .into_iter()
         .flatten()
         .collect();
+    drop(patches);
     let cameras: Vec<usize> = thumbnails.iter().map(|thumbnail| thumbnail.camera).collect();
     let response_asked = options.response && options.model == ExposureModel::Full;
     // One response is fitted for one color profile; light has none.

@@ -36,11 +36,7 @@ impl Observed {
 }
 
 /// Compares two photographs by what they share; `None` if that is too little.
-pub(super) fn compare(
-    mut samples: Vec<Shared>,
-    [first, second]: [usize; 2],
-    curve: &TransferCurve,
-) -> Option<Observed> {
+pub(super) fn compare(samples: &[Shared], [first, second]: [usize; 2], curve: &TransferCurve) -> Option<Observed> {
     if samples.len() < MIN_SHARED {
         return None;
     }
@@ -57,11 +53,7 @@ pub(super) fn compare(
     // Neighboring samples say the same; a few hundred of an overlap settle seven unknowns.
     const KEPT: usize = 600;
     let step = samples.len().div_ceil(KEPT);
-    let mut index = 0_usize;
-    samples.retain(|_| {
-        index += 1;
-        (index - 1).is_multiple_of(step)
-    });
-    let samples: Vec<Shared> = samples.into_iter().map(|sample| sample.with_variances(curve)).collect();
-    Some(Observed::new(pair, channel_medians, samples))
+    // Those alone take memory, for thousands of overlaps.
+    let kept = samples.iter().step_by(step).map(|sample| sample.with_variances(curve)).collect();
+    Some(Observed::new(pair, channel_medians, kept))
 }

@@ -48,14 +48,14 @@ impl Shared {
     }
 
     /// With the variances of samples encoded by `curve`: the same noise hides more of the light the darker it is.
-    pub(super) fn with_variances(self, curve: &TransferCurve) -> Self {
+    pub(super) fn with_variances(&self, curve: &TransferCurve) -> Self {
         let variance = |channels: [f32; 3]| {
             let light = f64::from(channels.iter().sum::<f32>() / 3.0).exp();
             let encoded = curve.encoded(light);
             let [low, high] = [encoded - 0.5 * NOISE, encoded + 0.5 * NOISE].map(|e| curve.linear(e));
             ((high - low) / light).powi(2) as f32
         };
-        Self { variances: self.log_light.map(variance).map(|one| one.max(LEAST_VARIANCE)), ..self }
+        Self { variances: self.log_light.map(variance).map(|one| one.max(LEAST_VARIANCE)), ..*self }
     }
 
     /// ln(first / second) of red, green and blue.
