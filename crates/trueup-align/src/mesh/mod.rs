@@ -51,7 +51,7 @@ pub use by_cameras::{ByCamerasInput, drawn_by_cameras, unless_worse};
 pub use camera_plane::CameraPlane;
 pub use closure::Closure;
 pub use coarsening::cell_px;
-pub(crate) use coarsening::coarsening;
+pub(crate) use coarsening::coarsening_of_steps;
 pub use input::MeshInput;
 pub use line_alignment::{LineAlignmentInput, LineAlignmentOptions, StraightInput};
 pub use options::{BaseShape, MeshOptions};

@@ -24,7 +24,7 @@ use trueup_core::mesh::GridMesh;
 
 use super::coverage::steepest;
 use super::photograph::PosedPhotograph;
-use crate::mesh::{LATTICE_CELLS, Meeting, coarsening, smooth_steps, tilt_from_level};
+use crate::mesh::{LATTICE_CELLS, Meeting, coarsening_of_steps, smooth_steps, tilt_from_level};
 
 /// By how many of its own pixels each vertex of a photograph's grid looks aside, row-major.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -134,7 +134,7 @@ impl<'a> Overlaps<'a> {
             self.photographs.iter().map(lattice).collect()
         };
         let usual = lattices(1.0);
-        let lattices = lattices(coarsening(usual.iter().map(GridMesh::len).sum()));
+        let lattices = lattices(coarsening_of_steps(usual.iter().map(GridMesh::len).sum()));
         let meetings: Vec<Vec<Meeting>> = lattices
             .par_iter()
             .enumerate()

@@ -29,8 +29,8 @@ use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
 
 use crate::layout::{CanvasLayout, check_mesh};
-use overlap::{Observed, compare};
-use samples::{Patch, shared};
+use overlap::{Observed, compare, kept_of_each};
+use samples::{Patch, meet, shared};
 use solve::{SolveInput, solve};
 
 const STAGE: &str = ExposureOptions::STAGE;
@@ -76,16 +76,21 @@ pub fn run(input: &ExposureInput<'_>, options: &ExposureOptions, context: &Stage
             Ok(Patch::new(&placed, thumbnail, scale, size, layout.period))
         })
         .collect::<Result<_>>()?;
-    let observed: Vec<Observed> = (0..count)
+    let following: Vec<Vec<usize>> = (0..count)
         .into_par_iter()
-        .map(|first| {
+        .map(|first| (first + 1..count).filter(|&second| meet(&patches[first], &patches[second], turn)).collect())
+        .collect();
+    let kept_samples = kept_of_each(following.iter().map(Vec::len).sum());
+    let observed: Vec<Observed> = following
+        .into_par_iter()
+        .enumerate()
+        .map(|(first, following)| {
             context.check_cancelled()?;
-            Ok((first + 1..count)
-                .filter_map(|second| {
-                    let samples = shared(&patches[first], &patches[second], turn);
-                    compare(&samples, [first, second], thumbnails[first].curve)
-                })
-                .collect::<Vec<_>>())
+            let observed = |second: usize| {
+                let samples = shared(&patches[first], &patches[second], turn);
+                compare(&samples, [first, second], thumbnails[first].curve, kept_samples)
+            };
+            Ok(following.into_iter().filter_map(observed).collect::<Vec<_>>())
         })
         .collect::<Result<Vec<_>>>()?
         .into_iter()
@@ -132,8 +137,10 @@ fn check(input: &ExposureInput<'_>, options: &ExposureOptions) -> Result<()> {
 
 /// Samples taken across a photograph, about, when the overlaps are compared.
 const SAMPLES: f64 = 10_000.0;
+/// Samples taken across all photographs, about, at most: 64 MB. Each of a thousand still has several times as many as are kept of its overlaps.
+const SAMPLES_OF_ALL: f64 = 4e6;
 
-/// Factor from the canvas to the grid of samples, at most 1: the median photograph gets [`SAMPLES`] of them.
+/// Factor from the canvas to the grid of samples, at most 1: the median photograph gets [`SAMPLES`] of them, or its part of [`SAMPLES_OF_ALL`].
 fn sampling_scale(layout: &CanvasLayout) -> f64 {
     let mut areas: Vec<f64> = layout
         .placed
@@ -148,7 +155,8 @@ fn sampling_scale(layout: &CanvasLayout) -> f64 {
     let median = areas.get(areas.len() / 2).copied().unwrap_or(1.0).max(1.0);
     // Coordinates beyond this are no sampling grid any more.
     const MAX_SIDE: f64 = 16_384.0;
-    let scale = (SAMPLES / median).sqrt().min(1.0).min(MAX_SIDE / layout.width.max(layout.height) as f64);
+    let samples = SAMPLES.min(SAMPLES_OF_ALL / areas.len().max(1) as f64);
+    let scale = (samples / median).sqrt().min(1.0).min(MAX_SIDE / layout.width.max(layout.height) as f64);
     // A turn is a whole number of samples.
     let whole = |period: usize| (period as f64 * scale).ceil() / period as f64;
     layout.period.map_or(scale, whole)

@@ -117,6 +117,14 @@ impl Patch {
     }
 }
 
+/// Whether two photographs have a sample in common; on a cylinder of `turn` columns, turns apart, too.
+pub(super) fn meet(first: &Patch, second: &Patch, turn: Option<usize>) -> bool {
+    let turns = if turn.is_some() { TURNS } else { 0 };
+    let turn = turn.unwrap_or(0);
+    (0..=turns).any(|turns| window_ahead(first, second, turns * turn).is_some())
+        || (1..=turns).any(|turns| window_ahead(second, first, turns * turn).is_some())
+}
+
 /// The places where both photographs tell their light; on a cylinder of `turn` columns, turns apart, too.
 pub(super) fn shared(first: &Patch, second: &Patch, turn: Option<usize>) -> Vec<Shared> {
     let Some(turn) = turn else { return shared_ahead(first, second, 0) };
@@ -127,13 +135,16 @@ pub(super) fn shared(first: &Patch, second: &Patch, turn: Option<usize>) -> Vec<
     ahead.chain(behind).collect()
 }
 
-/// The places where both photographs tell their light if the second is moved to the right by some columns.
-fn shared_ahead(first: &Patch, second: &Patch, by: usize) -> Vec<Shared> {
+/// The rows and columns of both photographs if the second is moved to the right by some columns; `None` if there are none.
+fn window_ahead(first: &Patch, second: &Patch, by: usize) -> Option<(Range<usize>, Range<usize>)> {
     let rows = common(&first.rows, &second.rows);
     let columns = common(&first.columns, &(second.columns.start + by..second.columns.end + by));
-    if rows.is_empty() || columns.is_empty() {
-        return Vec::new();
-    }
+    (!rows.is_empty() && !columns.is_empty()).then_some((rows, columns))
+}
+
+/// The places where both photographs tell their light if the second is moved to the right by some columns.
+fn shared_ahead(first: &Patch, second: &Patch, by: usize) -> Vec<Shared> {
+    let Some((rows, columns)) = window_ahead(first, second, by) else { return Vec::new() };
     let own = columns.start - by..columns.end - by;
     rows.flat_map(|y| first.row(y, &columns).iter().zip(second.row(y, &own)))
         .map(|(a, b)| Shared {
