@@ -88,6 +88,17 @@ impl VertexFactor {
         }
     }
 
+    /// Entries of a column, in the mean.
+    pub(super) fn mean_column(&self) -> f64 {
+        let (entries, columns) = match self {
+            Self::Complex(triangle) => triangle.size(),
+            Self::Real(triangle) => triangle.size(),
+            Self::SingleComplex(triangle) => triangle.size(),
+            Self::SingleReal(triangle) => triangle.size(),
+        };
+        entries as f64 / columns.max(1) as f64
+    }
+
     /// Whether it is in single precision, and so no more than a preconditioner.
     pub(super) fn is_single(&self) -> bool {
         matches!(self, Self::SingleComplex(_) | Self::SingleReal(_))
@@ -175,6 +186,11 @@ fn symbolic_factor(lower: &SymbolicSparseColMat<usize>, order: PermRef<'_, usize
 }
 
 impl<T: ComplexField> Triangle<T> {
+    /// Numbers of entries and of columns.
+    fn size(&self) -> (usize, usize) {
+        (self.symbolic.len_val(), self.symbolic.nrows())
+    }
+
     /// The factor of the matrix that has these entries at the places `lower` of its lower triangle.
     fn new(lower: &SymbolicSparseColMat<usize>, entries: Vec<T>, symbolic: SymbolicCholesky<usize>) -> Option<Self> {
         let (side, par) = (faer::Side::Lower, faer::Par::Seq);
