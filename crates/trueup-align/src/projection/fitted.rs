@@ -51,11 +51,16 @@ impl Fit {
         Some(Vector2::new(column.x, if self.upright == 1.0 { tangent } else { y }))
     }
 
-    /// The longitude of a direction, where the projection shows all of them and ends behind the viewer: what lies there on both sides of the cut,
-    /// at half a turn, is as far apart on the plane as can be. `None` for one that does not reach so far.
-    pub(super) fn longitude_from_cut(&self, direction: &Vector3<f64>) -> Option<f64> {
+    /// Whether the projection shows all longitudes and ends behind the viewer: what lies there on both sides of the cut, at half a turn, is as far
+    /// apart on the plane as can be.
+    pub(super) fn is_cut_behind(&self) -> bool {
+        self.turn_share() < 0.5
+    }
+
+    /// The longitude of a direction as the projection counts it.
+    pub(super) fn longitude(&self, direction: &Vector3<f64>) -> f64 {
         let across = if self.turned { direction.y } else { direction.x };
-        (self.turn_share() < 0.5).then(|| across.atan2(direction.z))
+        across.atan2(direction.z)
     }
 
     fn column(&self, longitude: f64) -> Option<Column> {

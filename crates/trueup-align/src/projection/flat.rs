@@ -133,12 +133,9 @@ impl Flat {
         }
     }
 
-    /// The longitude of a direction on a projection that ends at half a turn without closing there; `None` for all others.
-    pub(super) fn longitude_from_cut(&self, direction: &Vector3<f64>) -> Option<f64> {
-        match self.kind {
-            FlatKind::Fitted => self.fit.longitude_from_cut(direction),
-            _ => None,
-        }
+    /// Whether the projection ends at half a turn without closing there.
+    pub(super) fn is_cut_behind(&self) -> bool {
+        self.kind == FlatKind::Fitted && self.fit.is_cut_behind()
     }
 
     /// The unit direction of a place; `None` if none goes there.

@@ -147,9 +147,10 @@ impl<'a> Drawing<'a> {
         Some(on_canvas.min(in_photograph))
     }
 
-    /// See [`Flat::longitude_from_cut`](super::Flat::longitude_from_cut).
+    /// The longitude of a pixel in a view that is cut behind the viewer; `None` in all others.
     fn longitude_from_cut(&self, pixel: Vector2<f64>) -> Option<f64> {
-        self.placement.view.flat.longitude_from_cut(&self.direction(pixel))
+        let flat = &self.placement.view.flat;
+        flat.is_cut_behind().then(|| flat.fit.longitude(&self.direction(pixel)))
     }
 
     /// Lines close enough that cells follow the projection's curves.
