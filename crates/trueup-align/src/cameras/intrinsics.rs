@@ -101,11 +101,15 @@ pub(super) struct IntrinsicsModel {
 impl IntrinsicsModel {
     /// One focal length per camera group.
     pub(super) fn shared(priors: &[CameraPrior]) -> Self {
-        let mut groups: Vec<usize> = priors.iter().map(|prior| prior.camera_group).collect();
+        Self::common(&priors.iter().map(|prior| prior.camera_group).collect::<Vec<_>>())
+    }
+
+    /// One focal length for the photographs of each label, whatever the labels are.
+    pub(super) fn common(labels: &[usize]) -> Self {
+        let mut groups = labels.to_vec();
         groups.sort_unstable();
         groups.dedup();
-        let group_of: Vec<usize> =
-            priors.iter().map(|prior| groups.binary_search(&prior.camera_group).unwrap_or(0)).collect();
+        let group_of: Vec<usize> = labels.iter().map(|label| groups.binary_search(label).unwrap_or(0)).collect();
         Self::grouped(&group_of, &vec![only_focal(); groups.len()])
     }
 

@@ -3,7 +3,7 @@
 //! Start values come from metadata, from the pair homographies (`homography_focal`) and from a search over a common focal length (`focal`), or as GSP
 //! has them from local homographies (`local_focal`);
 //! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
-//! bundle adjustment (`bundle`), from coarse to fine (`refinement`). Terms of the lenses are added as long as the matches, and
+//! bundle adjustment (`bundle`), from coarse to fine (`refinement`), each with a focal length of its own where a lens was zoomed (`zoom`). Terms of the lenses are added as long as the matches, and
 //! edges that are to be straight (`straightness`), are sure of them (`lenses`, `lens_evidence`): a pinhole stays one. Pairs that then contradict the others are set
 //! aside (`contradictions`). Focal lengths that parallax leaves open are those that are expected, in part (`expected_focal`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
 //! (`flat_scene`, by `plane_adjustment`), and lines say how it is turned (`upright_plane`).
@@ -31,6 +31,7 @@ mod rotations;
 mod straightness;
 mod transfer;
 mod upright_plane;
+mod zoom;
 
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
@@ -73,7 +74,7 @@ pub struct Cameras {
     /// One camera per photograph, in working pixels; the reference photograph's rotation is the identity. Before a plane the
     /// rotations are from the plane's frame.
     pub cameras: Vec<Camera>,
-    /// Whether every photograph has a focal length of its own.
+    /// Whether photographs of a camera have focal lengths of their own, all or those that differ.
     pub per_picture_focal: bool,
     /// Root mean square residual of each pair in working pixels, in the order of the pairs given.
     pub pair_rms_px: Vec<f64>,

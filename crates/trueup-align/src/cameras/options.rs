@@ -69,7 +69,7 @@ trueup_core::options! {
         /// focal length, or a wrong one; 0 leaves it to them.
         fov: f64 = 0.0, between(0.0, 190.0), "degrees", basic;
         /// Which photographs share a focal length. `shared` where the lens was not touched and short rows still bend;
-        /// `per-photograph` where it was zoomed between photographs and `auto` does not notice.
+        /// `per-picture` where it was zoomed between photographs and `auto` does not notice.
         focal_sharing: FocalSharing = FocalSharing::Auto, Allowed::Any, "";
         /// Where the focal lengths of photographs without metadata start from. `local-homographies` to compare with GSP as published.
         start_focal: StartFocal = StartFocal::Searched, Allowed::Any, "";

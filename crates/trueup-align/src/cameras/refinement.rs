@@ -4,12 +4,13 @@ use trueup_core::{Result, StageContext};
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
 use super::expected_focal::{self, ExpectedFocal};
-use super::intrinsics::{FOCAL, IntrinsicsModel, ZOOM_SPREAD};
+use super::intrinsics::IntrinsicsModel;
 use super::lenses::{FoundLenses, LensSearch, settings};
 use super::observations::Observations;
 use super::options::{CameraOptions, FocalSharing};
 use super::prior::CameraPrior;
 use super::straightness::CurveObservations;
+use super::zoom;
 
 /// What to refine: the photographs, what was observed of them and which of them the others turn about.
 #[derive(Clone, Copy)]
@@ -27,7 +28,7 @@ pub(super) struct RefinementInput<'a> {
 /// Refined cameras and what became of their focal lengths.
 pub(super) struct Refined {
     pub parameters: Parameters,
-    /// Whether every photograph has a focal length of its own.
+    /// Whether photographs of a camera have focal lengths of their own, all or those that differ.
     pub per_picture_focal: bool,
     /// Whether no focal length could be found, and those expected were taken.
     pub focal_failed: bool,
@@ -79,24 +80,34 @@ pub(super) fn refine(
     let shared = IntrinsicsModel::shared(priors);
     let own = IntrinsicsModel::per_photograph(priors.len());
     let mut per_picture_focal = options.focal_sharing == FocalSharing::PerPicture;
-    let first_model = if per_picture_focal { &own } else { &shared };
+    let first_model = if per_picture_focal { own.clone() } else { shared.clone() };
 
-    let coarse = problem.minimize(start.clone(), first_model, COARSE_HUBER_PX, context)?;
-    let mut fine = problem.minimize(coarse, first_model, FINE_HUBER_PX, context)?;
+    let coarse = problem.minimize(start.clone(), &first_model, COARSE_HUBER_PX, context)?;
+    let mut fine = problem.minimize(coarse, &first_model, FINE_HUBER_PX, context)?;
     let search = LensSearch { problem: &problem, precise: &for_lenses, kind: options.kind_of_lens(), context };
     let with_lens = match per_picture_focal {
         false => search.find(&fine, &CameraPrior::lens_groups(priors))?,
         true => None,
     };
+    let mut model = first_model;
+    let mut unshared = None;
     if options.focal_sharing == FocalSharing::Auto && priors.len() > 1 {
         let free = problem.minimize(fine.clone(), &own, COARSE_HUBER_PX, context)?;
-        if problem.is_sound(&free) && focal_spread(&shared, &fine.focal_px, &free.focal_px) > ZOOM_SPREAD {
-            fine = problem.minimize(free, &own, FINE_HUBER_PX, context)?;
+        let zoomed = if problem.is_sound(&free) { zoom::found(&problem, &model, &fine, &free) } else { None };
+        if let Some(zoomed) = zoomed {
+            fine = problem.minimize(zoomed.start, &zoomed.model, COARSE_HUBER_PX, context)?;
+            fine = problem.minimize(fine, &zoomed.model, FINE_HUBER_PX, context)?;
+            unshared = Some(free);
+            model = zoomed.model;
             per_picture_focal = true;
         }
     }
+    // A lens that bends may make focal lengths seem to differ; a zoom is seen beside it, too.
     let explains_more = |lens: &FoundLenses| {
-        !per_picture_focal || cost_without_pulls(&problem, &lens.parameters) < cost_without_pulls(&problem, &fine)
+        let is_zoomed =
+            || unshared.as_ref().is_some_and(|own| zoom::fits_far_better(&problem, &shared, &lens.parameters, own));
+        !per_picture_focal
+            || cost_without_pulls(&problem, &lens.parameters) < cost_without_pulls(&problem, &fine) && !is_zoomed()
     };
     if let Some(FoundLenses { parameters, model }) = with_lens.filter(explains_more) {
         let parameters = for_lenses.sharpened(parameters, &model, context)?;
@@ -117,7 +128,7 @@ pub(super) fn refine(
             true => None,
         };
         let Some(ExpectedFocal { parameters, factor }) = expected else {
-            let parameters = problem.sharpened(fine, if per_picture_focal { &own } else { &shared }, context)?;
+            let parameters = problem.sharpened(fine, &model, context)?;
             return Ok(Refined { lens_doubt_px, ..Refined::of(parameters, per_picture_focal) });
         };
         let parameters = problem.sharpened(parameters, &IntrinsicsModel::fixed(priors.len()), context)?;
@@ -144,23 +155,4 @@ fn with_expected_focal(
     let fixed = Parameters { focal_px, ..start.clone() };
     let coarse = problem.minimize(fixed, &model, COARSE_HUBER_PX, context)?;
     problem.minimize(coarse, &model, FINE_HUBER_PX, context)
-}
-
-/// The largest robust spread, within a group, of the ratio of free to shared focal lengths: half the range between the
-/// quartile-like order statistics, which one runaway photograph cannot move.
-fn focal_spread(shared: &IntrinsicsModel, shared_focal: &[f64], free_focal: &[f64]) -> f64 {
-    let mut spread: f64 = 0.0;
-    for group in 0..shared.parameters {
-        let mut logs: Vec<f64> = (0..shared_focal.len())
-            .filter(|&k| shared.parameters_of[k][FOCAL] == Some(group))
-            .map(|k| (free_focal[k] / shared_focal[k]).ln())
-            .collect();
-        if logs.len() < 2 {
-            continue;
-        }
-        logs.sort_by(f64::total_cmp);
-        let (low, high) = (logs.len() / 4, logs.len() - 1 - logs.len() / 4);
-        spread = spread.max(0.5 * (logs[high] - logs[low]));
-    }
-    spread
 }

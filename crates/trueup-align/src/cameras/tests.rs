@@ -135,6 +135,20 @@ fn a_zoom_is_noticed() {
     }
 }
 
+/// One of eight photographs through a longer lens, or one of a row that two overlap only: fewer than a quarter, which do not move the quartiles.
+#[test]
+fn a_zoom_of_one_photograph_is_noticed() {
+    for (zoomed, longer) in [(3, 1.6), (5, 0.7), (0, 1.08)] {
+        let focal_of = |k: usize| if k == zoomed { 700.0 * longer } else { 700.0 };
+        let truth: Vec<Camera> = (0..8).map(|k| camera(focal_of(k), 14.0 * k as f64, 0.0, 2.0)).collect();
+        let cameras = estimate(&matched(&truth, 0.5, 0.0), None, &[0; 8]);
+        assert!(cameras.per_picture_focal, "{zoomed}");
+        for (k, camera) in cameras.cameras.iter().enumerate() {
+            assert!((camera.focal_px / focal_of(k) - 1.0).abs() < 0.02, "{k}: {} for {}", camera.focal_px, focal_of(k));
+        }
+    }
+}
+
 /// Cameras with this lens, and the principal point off center.
 fn bent(cameras: Vec<Camera>, radial: [f64; 4], off: [f64; 2]) -> Vec<Camera> {
     let lens = Lens::new(LensTerms { radial, ..LensTerms::default() });

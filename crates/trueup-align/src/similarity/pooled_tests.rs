@@ -52,6 +52,36 @@ fn level_lines_of_all_photographs_tell_the_vertical_where_few_are_upright() {
     assert!(max(&scene.errors_deg(&prior)) < 0.2, "{:?}", scene.errors_deg(&prior));
 }
 
+/// Eight photographs whose segments are all along two level directions, which climb by `slope_deg`. Cameras are rolled by 3 degrees, and so know the vertical to 1.6.
+fn without_upright_lines(slope_deg: f64) -> SyntheticScene {
+    let sweep = Sweep { roll_sd_deg: 3.0, ..Sweep::default() };
+    let level = with_lines(SyntheticScene::new(sweep, World::Random, 0.0, 13), 30, 0.5);
+    let mut scene = level.on_a_slope(slope_deg);
+    scene.triads = vec![missing(); scene.triads.len()];
+    for lines in &mut scene.lines {
+        lines.drain(20..40);
+    }
+    scene
+}
+
+/// Skylines and slopes make a frame of right angles, too: where this one lies 7.6 deviations from the cameras', it would have to stand out by 21.
+#[test]
+fn level_lines_alone_guide_near_where_the_cameras_call_down() {
+    let near = without_upright_lines(0.0).prior(&SimilarityOptions::default()).guidance;
+    assert!(near.used && near.pooled, "{:?}", near.failed_clause);
+    let far = without_upright_lines(12.0).prior(&SimilarityOptions::default()).guidance;
+    assert!(far.significance.is_some_and(|figure| figure > GUIDING_SIGNIFICANCE), "{:?}", far.significance);
+    assert!(!far.used, "{:?}", far.level);
+}
+
+/// By hand: 0.8 x 0.2^2 + 0.2 x 3^2 = 1.832 square degrees about each of two axes, a deviation of 1.914.
+#[test]
+fn level_lines_alone_leave_open_what_they_slope() {
+    let guidance = without_upright_lines(0.0).prior(&SimilarityOptions::default()).guidance;
+    let deviation = guidance.vertical_deviation.expect("known").to_degrees();
+    assert!((1.914..1.95).contains(&deviation), "{deviation}");
+}
+
 /// Segments without noise fit the true frame with all of their weight, and one that is two degrees off with next to nothing of it.
 #[test]
 fn segments_fit_the_frame_they_are_of() {

@@ -8,7 +8,7 @@ use trueup_core::{Result, StageContext};
 use super::camera_correction::{corrected_rotations, relative_certainties};
 use super::dominant::{Dominant, dominant_frame};
 use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrames, search_frames};
-use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause};
+use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause, needed_of_level_lines};
 use super::held::held_roll;
 use super::input::PriorInput;
 use super::jackknife::{covariance_by_photographs, covariance_by_sectors, deviation};
@@ -21,7 +21,7 @@ use super::turns::{RollEvidence, solve_turns};
 use super::upright::Upright;
 use super::vertical::{roll_of, vertical_by_reference, vertical_near, vertical_of};
 use super::vertical_vote::{SEARCH_DEG, vertical_peak};
-use super::witnesses::{Reconciled, reconciled};
+use super::witnesses::{MIN_UPRIGHT_PHOTOGRAPHS, Reconciled, covariance_of_slopes, reconciled};
 use crate::vanishing::{InterpretationPlanes, RefinedTriad};
 
 /// Fewest photographs whose level lines may be found to lie along a slope: of two, nothing but the few sectors they show tells how upright and level
@@ -213,8 +213,13 @@ impl<'a> SceneDirections<'a> {
             return None;
         }
         let frame = pooled.refined(&self.vote)?;
+        let down = self.vertical(&frame);
         // What stands out so far is agreed on.
-        if self.level.angle_to(&self.vertical(&frame)).is_some_and(|found| found.is_too_wide(true)) {
+        if self.level.angle_to(&down).is_some_and(|found| found.is_too_wide(true)) {
+            return None;
+        }
+        let needed = needed_of_level_lines(self.level.deviations_to(&down));
+        if !self.shows_upright_lines(&down) && pooled.significance < needed {
             return None;
         }
         let residuals = self.triads.iter().map(|triad| triad.map(|triad| triad_residual(&frame, &triad))).collect();
@@ -223,6 +228,11 @@ impl<'a> SceneDirections<'a> {
         guidance.inliers = self.inliers(&dominant);
         guidance.residuals.clone_from(&dominant.residuals);
         Some(dominant)
+    }
+
+    /// Whether enough photographs show lines along `down`; level ones alone may be those of a slope.
+    fn shows_upright_lines(&self, down: &Vector3<f64>) -> bool {
+        self.vote.support(down, joint::TOLERANCE_DEG.to_radians()).photographs >= MIN_UPRIGHT_PHOTOGRAPHS
     }
 
     /// The prior of accepted dominant directions; where they are not sure enough to guide, the vertical that they take part in.
@@ -253,7 +263,11 @@ impl<'a> SceneDirections<'a> {
         if joint {
             let vertical = column_near(&frame, &down);
             let refinement = Refinement { start: &frame, axes_used: 3, axis_weights: &axis_weights };
-            let covariance = self.covariance(refinement, vertical, asked.as_ref(), guidance.pooled);
+            let mut covariance = self.covariance(refinement, vertical, asked.as_ref(), guidance.pooled);
+            // Level lines count beside upright ones, or alone.
+            if reconciled.is_none() && horizontal_agreement(guidance) > 0.0 {
+                covariance += covariance_of_slopes(&down);
+            }
             down = self.weighed(&down, &covariance, guidance)?;
         }
         guidance.spread = reconciled.map(|found| VerticalSpread::about(&down, &found));

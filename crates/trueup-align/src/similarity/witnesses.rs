@@ -19,7 +19,7 @@ const SLOPE_SPREAD_DEG: f64 = 3.0;
 /// Share of scenes whose level lines lie along a slope. Reasoned.
 const SLOPING_SHARE: f64 = 0.2;
 /// Fewest photographs that must show upright lines, three each, to be heard beside the level ones.
-const MIN_UPRIGHT_PHOTOGRAPHS: usize = 2;
+pub(super) const MIN_UPRIGHT_PHOTOGRAPHS: usize = 2;
 /// Farthest that a vertical of upright lines may lie from the frame they were sought near, in tolerances of a segment's vote: others found another direction.
 const MAX_DISTANCE_TOLERANCES: f64 = 2.0;
 
@@ -92,6 +92,14 @@ pub(super) fn reconciled(vote: &LineVote, frame: &Matrix3<f64>, vertical: usize,
     let angle = upright.angle(&level);
     let groups = upright_scatter.groups;
     finite.then_some(Reconciled { vertical, covariance, groups, upright, angle, sloping: weighed.sloping })
+}
+
+/// Covariance in rad^2 of the `vertical` that level lines imply, by what they may slope: what they add to their scatter where no upright lines are heard beside
+/// them.
+pub(super) fn covariance_of_slopes(vertical: &Vector3<f64>) -> Matrix3<f64> {
+    let square = |deviation_deg: f64| deviation_deg.to_radians().powi(2);
+    let variance = (1.0 - SLOPING_SHARE) * square(LEVEL_SPREAD_DEG) + SLOPING_SHARE * square(SLOPE_SPREAD_DEG);
+    (Matrix3::identity() - vertical * vertical.transpose()) * variance
 }
 
 /// Scatter of column `axis` of a refined frame by leaving out one sector of the scene each; where lines are in too few of these, one
