@@ -22,6 +22,8 @@ pub(super) struct GateEvidence {
     /// Root mean square in radians of the rolls that the photographs would have, of those that were held alike; `None` where recorded gravity tells, so that
     /// nothing is expected of them.
     pub rolls: Option<f64>,
+    /// Where hardly any photograph shows upright lines, how far the dominant vertical lies from what is known without lines, in its standard deviations.
+    pub by_level_lines: Option<f64>,
 }
 
 /// How far a vertical lies from the one that the cameras tell.
@@ -111,11 +113,11 @@ fn needed_significance(photographs: usize, agree_as_very_few_must: bool, rolls: 
     (CONFIRMING_SIGNIFICANCE + unexpected / SIGNIFICANCE_LOG_ODDS).min(GUIDING_SIGNIFICANCE)
 }
 
-/// How far all lines together must stand out for a vertical that hardly any of them shows, and that lies so many `deviations` from what is known without them:
-/// as many standard deviations more as make up for how improbable that is. Skylines and slopes of nature make frames of level lines by chance; of some 600 cut
-/// sets three had such frames, at 0.5 deviations (2 degrees off, and standing out by 8.2), 4.5 (88 degrees, 7.1) and 7.7 (12 degrees, 7.04).
-pub(super) fn needed_of_level_lines(deviations: f64) -> f64 {
-    GUIDING_SIGNIFICANCE + 0.5 * deviations.powi(2) / SIGNIFICANCE_LOG_ODDS
+/// How many deviations a vertical that hardly any photograph shows may lie from what is known without lines, where all lines together stand out by `beyond` standard deviations more
+/// than they must: as many as that makes up for how improbable it is. Skylines and slopes of nature make frames of level lines by chance; of some 600 cut sets four had such
+/// frames, at 0.5 deviations (2 degrees off, and standing out by 8.2), 4.5 (88 degrees, 7.1), 7.3 (17 degrees, 5.8) and 7.7 (12 degrees, 7.04).
+pub(super) fn allowed_of_level_lines(beyond: f64) -> f64 {
+    (2.0 * SIGNIFICANCE_LOG_ODDS * beyond.max(0.0)).sqrt()
 }
 
 /// The divergence of the vanishing directions: the mean residual of the inliers over their share of the photographs.
@@ -144,7 +146,16 @@ pub(super) fn divergence(inlier_residuals: &[f64], photographs: usize, as_printe
 /// The paper has clause (a) alone, which cannot tell with few photographs: one photograph always fits its own triad.
 /// [`GateMode::Paper`] keeps to it.
 pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions) -> Option<String> {
-    let GateEvidence { photographs, inliers, divergence, from_cameras, significance, median_roll, rolls } = *evidence;
+    let GateEvidence {
+        photographs,
+        inliers,
+        divergence,
+        from_cameras,
+        significance,
+        median_roll,
+        rolls,
+        by_level_lines,
+    } = *evidence;
     // Not-a-number fails.
     let allowed = allowed_divergence(photographs, significance, options);
     if divergence.is_nan() || divergence > allowed {
@@ -168,6 +179,15 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
         return Some(format!(
             "the lines of all photographs together prefer no direction clearly ({significance} standard deviations, {needed} needed)"
         ));
+    }
+    if let Some((deviations, significance)) = by_level_lines.zip(significance) {
+        let allowed = allowed_of_level_lines(significance - CONFIRMING_SIGNIFICANCE);
+        if deviations > allowed {
+            let (deviations, allowed) = told_apart(deviations, allowed, 1);
+            return Some(format!(
+                "hardly any line is upright, and by level ones down is {deviations} deviations from where the cameras say ({allowed} allowed)"
+            ));
+        }
     }
     let agree_closely = divergence <= STEEP_DIVERGENCE_SHARE * options.max_divergence_few;
     if let Some(wide) = from_cameras.filter(|found| found.is_too_wide(agree_closely)) {
@@ -209,6 +229,7 @@ mod tests {
                 significance: Some(6.0),
                 median_roll: 0.05,
                 rolls: None,
+                by_level_lines: None,
             };
             failed_clause(&evidence, &SimilarityOptions::default()).is_some()
         };
@@ -232,6 +253,7 @@ mod tests {
                 significance: Some(significance),
                 median_roll: 0.05,
                 rolls: Some(rolls_deg.to_radians()),
+                by_level_lines: None,
             };
             failed_clause(&evidence, &SimilarityOptions::default()).is_some()
         };
@@ -245,6 +267,27 @@ mod tests {
         assert!(refused(0.021, 5.9, 1.0, 2));
         assert!(refused(0.0446, 6.6, 1.0, 2) && !refused(0.0444, 6.6, 1.0, 2));
         assert!(refused(0.11, 12.0, 1.0, 2), "no more than with many photographs");
+    }
+
+    /// sqrt(2 x 2 x (7 - 5)) = 2.83 deviations from the cameras' vertical are allowed to lines that stand out by 7, however many photographs agree.
+    #[test]
+    fn level_lines_alone_stand_out_by_more_the_farther_they_lie_from_the_cameras() {
+        let refused = |significance: f64, by_level_lines: Option<f64>| {
+            let evidence = GateEvidence {
+                photographs: 9,
+                inliers: 7,
+                divergence: 0.035,
+                from_cameras: None,
+                significance: Some(significance),
+                median_roll: 0.05,
+                rolls: Some(0.1),
+                by_level_lines,
+            };
+            failed_clause(&evidence, &SimilarityOptions::default()).is_some()
+        };
+        assert!(!refused(5.1, None));
+        assert!(refused(6.9, Some(2.8)) && !refused(7.0, Some(2.8)));
+        assert!(refused(5.8, Some(7.3)));
     }
 
     #[test]

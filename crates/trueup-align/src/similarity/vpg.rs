@@ -8,7 +8,7 @@ use trueup_core::{Result, StageContext};
 use super::camera_correction::{corrected_rotations, relative_certainties};
 use super::dominant::{Dominant, dominant_frame};
 use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrames, search_frames};
-use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause, needed_of_level_lines};
+use super::gate::{GateEvidence, allowed_divergence, allowed_of_level_lines, divergence, failed_clause};
 use super::held::held_roll;
 use super::input::PriorInput;
 use super::jackknife::{covariance_by_photographs, covariance_by_sectors, deviation};
@@ -199,6 +199,7 @@ impl<'a> SceneDirections<'a> {
                 false => magnitudes.get(magnitudes.len().saturating_sub(1) / 2).copied().unwrap_or(f64::INFINITY),
             },
             rolls: (!self.level.has_gravity).then(|| held_roll(self.level.rotations, &down)),
+            by_level_lines: self.by_level_lines(&down),
         };
         guidance.divergence = Some(evidence.divergence).filter(|divergence| divergence.is_finite());
         guidance.inlier_ratio = inliers.len() as f64 / photographs as f64;
@@ -218,8 +219,8 @@ impl<'a> SceneDirections<'a> {
         if self.level.angle_to(&down).is_some_and(|found| found.is_too_wide(true)) {
             return None;
         }
-        let needed = needed_of_level_lines(self.level.deviations_to(&down));
-        if !self.shows_upright_lines(&down) && pooled.significance < needed {
+        let allowed = allowed_of_level_lines(pooled.significance - GUIDING_SIGNIFICANCE);
+        if self.by_level_lines(&down).is_some_and(|deviations| deviations > allowed) {
             return None;
         }
         let residuals = self.triads.iter().map(|triad| triad.map(|triad| triad_residual(&frame, &triad))).collect();
@@ -230,9 +231,10 @@ impl<'a> SceneDirections<'a> {
         Some(dominant)
     }
 
-    /// Whether enough photographs show lines along `down`; level ones alone may be those of a slope.
-    fn shows_upright_lines(&self, down: &Vector3<f64>) -> bool {
-        self.vote.support(down, joint::TOLERANCE_DEG.to_radians()).photographs >= MIN_UPRIGHT_PHOTOGRAPHS
+    /// How many deviations of what is known without lines `down` lies from there, where too few photographs show lines along it; level ones alone may be those of a slope.
+    fn by_level_lines(&self, down: &Vector3<f64>) -> Option<f64> {
+        let upright = self.vote.support(down, joint::TOLERANCE_DEG.to_radians()).photographs;
+        (upright < MIN_UPRIGHT_PHOTOGRAPHS).then(|| self.level.deviations_to(down))
     }
 
     /// The prior of accepted dominant directions; where they are not sure enough to guide, the vertical that they take part in.
