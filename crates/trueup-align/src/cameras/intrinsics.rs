@@ -15,8 +15,8 @@ pub(super) const RADIAL: usize = 3;
 /// First of the two tangential terms.
 pub(super) const TANGENTIAL: usize = 7;
 
-/// Relative spread of separately estimated focal lengths above which `cameras.focal_sharing=auto` lets every photograph have
-/// its own.
+/// Relative spread of separately estimated focal lengths above which `cameras.focal_sharing=auto` lets every photograph have its own; and how far one differs from the
+/// others that may have been zoomed.
 pub(super) const ZOOM_SPREAD: f64 = 0.03;
 
 /// Standard deviation of a radial term before anything is seen: an action camera's reaches 0.3.

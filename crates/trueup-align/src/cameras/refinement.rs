@@ -80,16 +80,15 @@ pub(super) fn refine(
     let shared = IntrinsicsModel::shared(priors);
     let own = IntrinsicsModel::per_photograph(priors.len());
     let mut per_picture_focal = options.focal_sharing == FocalSharing::PerPicture;
-    let first_model = if per_picture_focal { own.clone() } else { shared.clone() };
+    let mut model = if per_picture_focal { own.clone() } else { shared.clone() };
 
-    let coarse = problem.minimize(start.clone(), &first_model, COARSE_HUBER_PX, context)?;
-    let mut fine = problem.minimize(coarse, &first_model, FINE_HUBER_PX, context)?;
+    let coarse = problem.minimize(start.clone(), &model, COARSE_HUBER_PX, context)?;
+    let mut fine = problem.minimize(coarse, &model, FINE_HUBER_PX, context)?;
     let search = LensSearch { problem: &problem, precise: &for_lenses, kind: options.kind_of_lens(), context };
     let with_lens = match per_picture_focal {
         false => search.find(&fine, &CameraPrior::lens_groups(priors))?,
         true => None,
     };
-    let mut model = first_model;
     let mut unshared = None;
     if options.focal_sharing == FocalSharing::Auto && priors.len() > 1 {
         let free = problem.minimize(fine.clone(), &own, COARSE_HUBER_PX, context)?;

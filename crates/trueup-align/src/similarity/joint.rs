@@ -123,6 +123,11 @@ impl LineVote {
         self.photographs.iter().map(|photograph| photograph.planes.total_weight).sum()
     }
 
+    /// Number of photographs that show a direction: by three segments or more that may vote for it.
+    pub(super) fn photographs_along(&self, direction: &Vector3<f64>) -> usize {
+        self.support(direction, TOLERANCE_DEG.to_radians()).photographs
+    }
+
     /// Refines a frame (columns are directions in the common frame) over SO(3); `axis_weights` multiply the weights of
     /// the segments of each axis.
     pub(super) fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {

@@ -233,8 +233,7 @@ impl<'a> SceneDirections<'a> {
 
     /// How many deviations of what is known without lines `down` lies from there, where too few photographs show lines along it; level ones alone may be those of a slope.
     fn by_level_lines(&self, down: &Vector3<f64>) -> Option<f64> {
-        let upright = self.vote.support(down, joint::TOLERANCE_DEG.to_radians()).photographs;
-        (upright < MIN_UPRIGHT_PHOTOGRAPHS).then(|| self.level.deviations_to(down))
+        (self.vote.photographs_along(down) < MIN_UPRIGHT_PHOTOGRAPHS).then(|| self.level.deviations_to(down))
     }
 
     /// The prior of accepted dominant directions; where they are not sure enough to guide, the vertical that they take part in.
@@ -266,7 +265,7 @@ impl<'a> SceneDirections<'a> {
             let vertical = column_near(&frame, &down);
             let refinement = Refinement { start: &frame, axes_used: 3, axis_weights: &axis_weights };
             let mut covariance = self.covariance(refinement, vertical, asked.as_ref(), guidance.pooled);
-            // Level lines count beside upright ones, or alone.
+            // Where upright lines are not heard beside the level ones, nothing tells whether these slope.
             if reconciled.is_none() && horizontal_agreement(guidance) > 0.0 {
                 covariance += covariance_of_slopes(&down);
             }
@@ -344,7 +343,7 @@ impl<'a> SceneDirections<'a> {
             return Err(self.level.down);
         }
         // Also of photographs whose own directions do not agree, lines may.
-        let telling = self.vote.support(lines, joint::TOLERANCE_DEG.to_radians()).photographs;
+        let telling = self.vote.photographs_along(lines);
         let believed = self.level.without_contradicted_horizon(lines, deviation);
         let (down, evidence) = believed.with_lines(lines, covariance, telling);
         let outweigh = evidence.first().is_some_and(|lines| lines.share >= GUIDING_SHARE);

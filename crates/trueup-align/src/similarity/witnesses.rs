@@ -69,7 +69,7 @@ pub(super) fn reconciled(vote: &LineVote, frame: &Matrix3<f64>, vertical: usize,
     let upright_frame = vote.refine_first_axis(&Matrix3::from_columns(&[start, first, second]));
     let upright: Vector3<f64> = upright_frame.column(0).into_owned();
     let farthest = MAX_DISTANCE_TOLERANCES * TOLERANCE_DEG.to_radians();
-    let shown = vote.support(&upright, TOLERANCE_DEG.to_radians()).photographs;
+    let shown = vote.photographs_along(&upright);
     if shown < MIN_UPRIGHT_PHOTOGRAPHS || upright.angle(&start) > farthest {
         return None;
     }
