@@ -50,7 +50,7 @@ trueup_core::options! {
         /// How far photographs may contradict each other because of parallax and still be made to meet; beyond, each
         /// stays where its camera looks. Raise it for hand-held photographs of near things that show double, lower it
         /// where meeting bends them.
-        max_parallax_deg: f64 = 4.0, between(0.0, 45.0), "degrees";
+        max_parallax_deg: f64 = 8.0, between(0.0, 45.0), "degrees";
     }
 }
 

@@ -147,8 +147,8 @@ fn better_turn(
 /// Where clearly more matches agree with a lens that turned than with any homography, that is what is believed.
 ///
 /// A pair is joined if its homography is believable in the overlap it predicts, and the matches that agree with it are
-/// at least `min_inliers` and more than alpha + beta n_f of the n_f matches in that overlap. A forced pair needs only
-/// [`MIN_INLIERS_BY_GRAPH`].
+/// at least `min_inliers` and more than alpha + beta n_f of the n_f matches in that overlap. Where they are `min_inliers` and not enough, those on
+/// further planes and elsewhere in depth count with them. A forced pair needs only [`MIN_INLIERS_BY_GRAPH`].
 ///
 /// # Errors
 /// [`Error::Options`]; [`Error::Input`] if the photographs are the same or features contradict themselves;
@@ -156,6 +156,9 @@ fn better_turn(
 ///
 /// # Source
 /// The test: Brown and Lowe, Automatic panoramic image stitching using invariant features, section 3.2.
+///
+/// # Departures
+/// Brown and Lowe count what agrees with one homography, since their cameras turn about one point.
 pub(super) fn match_pair(
     input: &PairInput<'_>,
     options: &MatchingOptions,
@@ -214,18 +217,18 @@ pub(super) fn match_pair(
     pair.agreeing = model.inliers.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
     pair.b_from_a = Some(scaled_rows(&model.b_from_a));
     input.judge(&mut pair, options);
-    if pair.verdict.is_joined() {
-        let joined = JoinedPair { input, putative, points, model: &model };
-        let (inliers, is_known) = joined.all_inliers(&mut generator);
-        let refiner = Refiner { a: &a.features.surroundings, b: &b.features.surroundings };
-        let in_b = |point| model.in_b(point);
-        pair.inliers = refiner.refined(inliers, in_b).matches.into();
-        let mut generator = context.generator("matches elsewhere", seed);
-        let cameras = model.cameras([a.frame, b.frame]);
-        let found = matches_elsewhere(points, &is_known, &model.b_from_a, &cameras, b.frame, &mut generator);
-        let elsewhere = refiner.refined(found.into_iter().map(|k| putative[k].at).collect(), in_b);
-        if elsewhere.matches.len() >= FEWEST_ELSEWHERE || elsewhere.found_again >= FEWEST_CONFIRMED {
-            pair.elsewhere = elsewhere.matches.into();
+    // Before strong parallax no plane alone explains enough of the matches: what else two cameras explain counts as well.
+    let is_promising = pair.verdict == PairVerdict::TooFewInliers && pair.agreeing >= options.min_inliers;
+    if pair.verdict.is_joined() || is_promising {
+        let modeled = ModeledPair { input, putative, points, model: &model };
+        let explained = modeled.explained(&mut generator, &mut context.generator("matches elsewhere", seed));
+        if is_promising {
+            pair.agreeing = explained.all.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
+            input.judge(&mut pair, options);
+        }
+        if pair.verdict.is_joined() {
+            pair.inliers = explained.inliers.into();
+            pair.elsewhere = explained.elsewhere.into();
         }
     }
     Ok(pair)
@@ -275,8 +278,8 @@ impl Model {
     }
 }
 
-/// A joined pair whose matches are to be completed.
-struct JoinedPair<'a> {
+/// A pair whose matches are to be completed.
+struct ModeledPair<'a> {
     input: &'a PairInput<'a>,
     /// Most distinctive first.
     putative: &'a [PutativeMatch],
@@ -285,7 +288,35 @@ struct JoinedPair<'a> {
     model: &'a Model,
 }
 
-impl JoinedPair<'_> {
+/// What two cameras explain of the matches of a pair.
+struct ExplainedMatches {
+    /// Those on planes, refined.
+    inliers: Vec<PointMatch>,
+    /// Those elsewhere in depth, refined; none where they are too few to be believed.
+    elsewhere: Vec<PointMatch>,
+    /// Indices of both.
+    all: Vec<usize>,
+}
+
+impl ModeledPair<'_> {
+    /// Every match that the model, a further plane or the geometry of two cameras explains.
+    fn explained(&self, planes: &mut impl Rng, elsewhere: &mut impl Rng) -> ExplainedMatches {
+        let Self { input: PairInput { a, b, .. }, putative, points, model } = *self;
+        let (inliers, is_known) = self.all_inliers(planes);
+        let cameras = model.cameras([a.frame, b.frame]);
+        let found = matches_elsewhere(points, &is_known, &model.b_from_a, &cameras, b.frame, elsewhere);
+        let refiner = Refiner { a: &a.features.surroundings, b: &b.features.surroundings };
+        let in_b = |point| model.in_b(point);
+        let refined = refiner.refined(found.iter().map(|&k| putative[k].at).collect(), in_b);
+        let is_believed = refined.matches.len() >= FEWEST_ELSEWHERE || refined.found_again >= FEWEST_CONFIRMED;
+        let known = (0..is_known.len()).filter(|&k| is_known[k]);
+        ExplainedMatches {
+            inliers: refiner.refined(inliers, in_b).matches,
+            elsewhere: if is_believed { refined.matches } else { Vec::new() },
+            all: known.chain(found.into_iter().filter(|_| is_believed)).collect(),
+        }
+    }
+
     /// The final matches, those that agree with the model and then those of further planes; and which of the putative ones are among them.
     fn all_inliers(&self, generator: &mut impl Rng) -> (Vec<PointMatch>, Vec<bool>) {
         let mut is_known = vec![false; self.putative.len()];
