@@ -336,6 +336,32 @@ fn a_few_matches_elsewhere_in_depth_are_not_believed() {
     assert_eq!([elsewhere(0), elsewhere(7), elsewhere(12)], [0, 0, 12]);
 }
 
+/// Forty points of a plane, sixty before it on something round, and sixty that only look alike: too few agree with the plane alone.
+#[test]
+fn what_lies_before_a_plane_joins_a_pair_with_it() {
+    let round = |in_a: Vector2<f64>| 20.0 + 60.0 * ((in_a.x - 520.0) / 250.0).powi(2) + 40.0 * (in_a.y / 300.0).sin();
+    let matched = |is_round: bool| {
+        let mut generator = generator(18);
+        let mut photographs = PhotographPair::default();
+        photographs.add_plane(&example_map(), 40, 0.3, &mut generator);
+        for _ in 0..60 {
+            let in_a = Vector2::new(generator.random_range(320.0..760.0), generator.random_range(60.0..560.0));
+            let nearer = Vector2::new(if is_round { round(in_a) } else { generator.random_range(20.0..120.0) }, 0.0);
+            let aside = if is_round { 0.0 } else { generator.random_range(-80.0..80.0) };
+            photographs.add(in_a, example_map().apply(in_a) + nearer + Vector2::new(0.0, aside), &mut generator);
+        }
+        photographs.add_outliers(60, &mut generator);
+        photographs.matched(false, &MatchingOptions::default())
+    };
+    let joined = matched(true);
+    assert_eq!(joined.verdict, PairVerdict::Joined, "{} of {}", joined.agreeing, joined.needed);
+    assert!((85..105).contains(&joined.agreeing) && joined.elsewhere.len() >= 45, "{}", joined.agreeing);
+    assert!((38..46).contains(&joined.inliers.len()) && joined.inliers.len() < joined.needed, "{}", joined.needed);
+    let refused = matched(false);
+    assert_eq!(refused.verdict, PairVerdict::TooFewInliers, "{} of {}", refused.agreeing, refused.needed);
+    assert!(refused.inliers.is_empty() && refused.elsewhere.is_empty());
+}
+
 /// Waves that the map carries from one photograph into the other; features are off by up to 0.6 px along each axis.
 #[test]
 fn matches_are_placed_by_what_surrounds_them() {
