@@ -129,7 +129,8 @@ impl<'a> Overlaps<'a> {
             .map(|pixel| self.sights(k, pixel))
             .filter(|sights| sights[0].direction.dot(down).abs() < gentle)
             .flat_map(|sights| {
-                sights[1..].iter().map(|sight| sight.direction.angle(&sights[0].direction)).collect::<Vec<_>>()
+                let own = sights[0].direction;
+                sights.into_iter().skip(1).map(move |sight| sight.direction.angle(&own))
             })
             .collect();
         let middle = angles.len() / 2;
