@@ -2,6 +2,7 @@
 
 mod batch;
 mod book;
+mod borders;
 mod cache;
 mod cli;
 mod color;

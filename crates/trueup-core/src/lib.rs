@@ -21,6 +21,7 @@ pub mod context;
 pub mod diagnostics;
 pub mod error;
 pub mod geometry;
+pub mod inset;
 pub mod interpolation;
 mod invalid_option;
 pub mod lens;

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::inset::Inset;
+
 /// Bits of a word.
 const WORD_BITS: usize = u64::BITS as usize;
 
@@ -69,6 +71,16 @@ impl Mask {
         Self::from_fn(self.width, self.height, |x, y| !self.is_marked(x, y))
     }
 
+    /// The mask of the photograph inside `inset`; of nothing if nothing is left of it.
+    #[must_use]
+    pub fn inside(self, inset: Inset) -> Self {
+        if inset.is_none() {
+            return self;
+        }
+        let [width, height] = inset.inner([self.width, self.height]).unwrap_or_default();
+        Self::from_fn(width, height, |x, y| self.is_marked(x + inset.left, y + inset.top))
+    }
+
     /// This mask and another of the same size: what is marked in either. Sizes that differ leave this one as it is.
     #[must_use]
     pub fn or(mut self, other: &Self) -> Self {
@@ -88,6 +100,15 @@ pub struct Masks {
     pub kept: Option<Arc<Mask>>,
 }
 
+impl Masks {
+    /// The masks of the photograph inside `inset`.
+    #[must_use]
+    pub fn inside(self, inset: Inset) -> Self {
+        let inside = |mask: Arc<Mask>| Arc::new(Arc::unwrap_or_clone(mask).inside(inset));
+        Self { ignored: self.ignored.map(inside), kept: self.kept.map(inside) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,6 +124,14 @@ mod tests {
         assert!(mask.contains([65.0, 1.99]) && !mask.contains([66.0, 1.5]) && !mask.contains([-1.0, 1.0]));
         assert!(mask.any_within([63.5, 1.5], [4.0, 1.0]) && !mask.any_within([62.5, 1.5], [4.0, 1.0]));
         assert!(!mask.any_within([f64::NAN, 1.0], [4.0, 4.0]) && !mask.any_within([1e300, 1.0], [4.0, 1e300]));
+    }
+
+    #[test]
+    fn a_mask_is_cut_with_its_photograph() {
+        let mask = Mask::from_fn(8, 6, |x, y| (x, y) == (3, 2));
+        let masks = Masks { ignored: Some(Arc::new(mask)), kept: None };
+        let cut = masks.inside(Inset { left: 2, top: 1, right: 1, bottom: 0 });
+        assert_eq!(cut.ignored.as_deref(), Some(&Mask::from_fn(5, 5, |x, y| (x, y) == (1, 1))));
     }
 
     #[test]

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::color::{LightRange, TransferCurve};
 use crate::error::Result;
+use crate::inset::Inset;
 use crate::lens::PlacedLens;
 use crate::mask::Masks;
 use crate::raster::Photograph;
@@ -71,10 +72,13 @@ pub struct SourceImage {
     pub path: PathBuf,
     /// Short name for messages: the file's name, or enough of the path to be unique among the inputs.
     pub name: String,
-    /// Width in pixels after orientation.
+    /// Width in pixels after orientation, without what lies beside the photograph.
     pub width: usize,
-    /// Height in pixels after orientation.
+    /// Height in pixels after orientation, without what lies beside the photograph.
     pub height: usize,
+    /// What of the picture in the file lies beside the photograph, after orientation: it is cut off on decoding.
+    #[serde(default)]
+    pub inset: Inset,
     /// EXIF orientation (1 to 8) that is applied on decoding: 1 where the tag is absent or stale.
     pub orientation: u8,
     /// Focal length from metadata, if believable.
@@ -114,6 +118,7 @@ impl SourceImage {
             name: name.into(),
             width,
             height,
+            inset: Inset::default(),
             orientation: 1,
             focal_prior: None,
             camera_model: None,
@@ -126,6 +131,39 @@ impl SourceImage {
             light: None,
             stack: Vec::new(),
         }
+    }
+
+    /// Width and height of the picture in the file, after orientation.
+    pub fn picture_size(&self) -> [usize; 2] {
+        self.inset.outer([self.width, self.height])
+    }
+
+    /// The photograph that lies in this picture inside `inset`, with what is known of its lens; `None` if nothing is left of it.
+    ///
+    /// A stated focal length in terms of 35 mm film is taken to be that of the photograph, which was smaller on the film then; any other
+    /// one has to do with pixels.
+    pub fn inside(self, inset: Inset) -> Option<Self> {
+        let [old_width, old_height] = [self.width, self.height];
+        let [width, height] = inset.inner([old_width, old_height])?;
+        let smaller = (width as f64).hypot(height as f64) / (old_width as f64).hypot(old_height as f64);
+        let of_photograph = |prior: FocalPrior| match prior.source {
+            FocalSource::Equivalent35mm => FocalPrior { focal_px: prior.focal_px * smaller, ..prior },
+            _ => prior,
+        };
+        let [right, down] = inset.offset();
+        let moved = |lens: PlacedLens| {
+            let [x, y] = lens.center_px;
+            PlacedLens { center_px: [x - right, y - down], ..lens }
+        };
+        let sides = |one: usize, more: usize| one.saturating_add(more);
+        let inset = Inset {
+            left: sides(self.inset.left, inset.left),
+            top: sides(self.inset.top, inset.top),
+            right: sides(self.inset.right, inset.right),
+            bottom: sides(self.inset.bottom, inset.bottom),
+        };
+        let (focal_prior, lens) = (self.focal_prior.map(of_photograph), self.lens.map(moved));
+        Some(Self { width, height, inset, focal_prior, lens, ..self })
     }
 
     /// Whether the file says something of the camera that took it.

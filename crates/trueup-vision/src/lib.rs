@@ -4,6 +4,7 @@
 //! Positions are in the pixels of the photograph given (working pixels in the pipeline), corner at (0, 0), the center of
 //! the first pixel at (0.5, 0.5).
 
+pub mod border;
 pub mod features;
 pub mod frames;
 mod gray;

@@ -21,9 +21,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::mesh::GridMesh;
+use trueup_core::statistics::median_of;
 
 use super::coverage::{samples, steepest};
 use super::photograph::PosedPhotograph;
+use super::seen::smooth;
 use crate::mesh::{LATTICE_CELLS, Meeting, coarsening_of_steps, smooth_steps, tilt_from_level};
 
 /// By how many of its own pixels each vertex of a photograph's grid looks aside, row-major.
@@ -125,16 +127,14 @@ impl<'a> Overlaps<'a> {
         /// Pixels looked at along each side.
         const SAMPLES: usize = 17;
         let gentle = WHOLE_DEG.to_radians().sin();
-        let mut angles: Vec<f64> = samples(&self.photographs[k], SAMPLES)
+        let angles = samples(&self.photographs[k], SAMPLES)
             .map(|pixel| self.sights(k, pixel))
             .filter(|sights| sights[0].direction.dot(down).abs() < gentle)
             .flat_map(|sights| {
                 let own = sights[0].direction;
                 sights.into_iter().skip(1).map(move |sight| sight.direction.angle(&own))
-            })
-            .collect();
-        let middle = angles.len() / 2;
-        if angles.is_empty() { 0.0 } else { *angles.select_nth_unstable_by(middle, f64::total_cmp).1 }
+            });
+        median_of(angles).unwrap_or(0.0)
     }
 
     /// Who sees what photograph `k` has at `pixel`: itself first.
@@ -254,7 +254,7 @@ fn evidence(parallax: f64) -> f64 {
     const NONE: f64 = 3e-4;
     /// Radians: certain.
     const WHOLE: f64 = 12e-4;
-    smooth_step((parallax - NONE) / (WHOLE - NONE))
+    smooth(parallax, [NONE, WHOLE])
 }
 
 /// 1 in the middle of a photograph, 0 on its border.
@@ -293,13 +293,7 @@ fn room_to_meet(sights: &[Sight], seen: impl Fn(&Sight) -> Vector3<f64>) -> f64 
     let directions: Vec<Vector3<f64>> = sights.iter().map(seen).collect();
     let pairs = directions.iter().enumerate().flat_map(|(k, one)| directions[..k].iter().map(|other| one.angle(other)));
     let apart = pairs.fold(f64::MIN_POSITIVE, f64::max);
-    smooth_step(MOST_PER_ROOM * room / apart)
-}
-
-/// 0 up to 0, 1 from 1 on, and smooth between.
-fn smooth_step(share: f64) -> f64 {
-    let share = share.clamp(0.0, 1.0);
-    share * share * (3.0 - 2.0 * share)
+    smooth(MOST_PER_ROOM * room / apart, [0.0, 1.0])
 }
 
 /// The mean of the directions `seen`; `None` if none of the sights counts.
@@ -311,7 +305,7 @@ fn mean_direction(sights: &[Sight], seen: impl Fn(&Sight) -> Vector3<f64>) -> Op
 fn kept(sights: &[Sight], mean: &Vector3<f64>, max_parallax: f64) -> f64 {
     let counted = sights.iter().filter(|sight| sight.weight > 0.0);
     let farthest = counted.map(|sight| sight.direction.angle(mean)).fold(sights[0].direction.angle(mean), f64::max);
-    smooth_step(2.0 - 2.0 * farthest / max_parallax.max(f64::MIN_POSITIVE))
+    smooth(2.0 - 2.0 * farthest / max_parallax.max(f64::MIN_POSITIVE), [0.0, 1.0])
 }
 
 /// How far sights are believed, together.

@@ -187,7 +187,10 @@ impl FilePhotographs {
         }
         let whole = |photograph: &Photograph| reduce_photograph(photograph, &source.name, frame, thumbnail_max_area);
         // As it is, without a copy.
-        let is_as_given = self.conversion(index).is_none() && source.stack.is_empty() && self.light.is_none();
+        let is_as_given = self.conversion(index).is_none()
+            && source.stack.is_empty()
+            && self.light.is_none()
+            && source.inset.is_none();
         if let Some(photograph) = self.in_memory(index).filter(|_| is_as_given) {
             return whole(photograph);
         }
@@ -225,8 +228,8 @@ impl FilePhotographs {
 
     /// One file, or what is in memory in its place, in the common color space.
     fn decoded(&self, source: &SourceImage, conversion: Option<&Conversion>) -> Result<Photograph> {
-        let given = self.in_memory.of(source).map(|photograph| photograph.as_ref().clone());
-        let decoded = given.map_or_else(|| photograph(source), Ok)?;
+        let given = self.in_memory.of(source).map(|photograph| source.inset.cut(photograph.as_ref().clone()));
+        let decoded = given.unwrap_or_else(|| photograph(source))?;
         match (conversion, source.light.and_then(TransferCurve::light)) {
             (None, _) => Ok(decoded),
             (Some(conversion), None) => conversion.apply(decoded, &source.name),

@@ -16,7 +16,7 @@ const HALF: f32 = 0.5;
 
 /// Reads a picture that marks parts of the photograph `source`: the pixels that are white and opaque, at least by half.
 ///
-/// The picture has the photograph's size as it is shown. One that has the size in which a photograph with a quarter turn
+/// The picture has the photograph's size as it is shown, with what lies beside it in its file. One that has the size in which a photograph with a quarter turn
 /// is stored is turned with it.
 ///
 /// # Errors
@@ -44,20 +44,21 @@ pub fn mask_in_memory(picture: &Photograph, name: &str, source: &SourceImage) ->
 
 fn marks(picture: &Photograph, name: &str, source: &SourceImage) -> Result<Mask> {
     let size = (picture.width(), picture.height());
-    let turned = source.orientation >= 5 && source.width != source.height && size == (source.height, source.width);
-    if size != (source.width, source.height) && !turned {
+    let [width, height] = source.picture_size();
+    let turned = source.orientation >= 5 && width != height && size == (height, width);
+    if size != (width, height) && !turned {
         return Err(Error::input(
             name,
             format!(
                 "the mask has {} x {} px, the photograph {} has {} x {} px",
-                size.0, size.1, source.name, source.width, source.height
+                size.0, size.1, source.name, width, height
             ),
             "Save the mask in the size of the photograph as it is shown.",
         ));
     }
     let white = white(picture)?;
     let white = if turned { orientation::upright(white, source.orientation) } else { white };
-    Ok(Mask::from_fn(white.width(), white.height(), |x, y| white.pixel(x, y)[0]))
+    Ok(Mask::from_fn(white.width(), white.height(), |x, y| white.pixel(x, y)[0]).inside(source.inset))
 }
 
 fn white(picture: &Photograph) -> Result<Raster<bool>> {

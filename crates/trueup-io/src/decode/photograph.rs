@@ -13,7 +13,7 @@ use crate::format::{Input, PLAIN_PIXEL_BYTES, Reading};
 use crate::formats;
 use crate::metadata::header;
 
-/// Decodes a photograph in full size, upright.
+/// Decodes a photograph in full size, upright, without what lies beside it in its file.
 ///
 /// Gray stays one channel; gray with alpha becomes RGBA; palettes, CMYK and one-bit photographs become RGB or gray;
 /// 16 bits a sample stay 16; floating point is taken for linear light, 1 for white, and becomes 16 bits of sRGB, what is
@@ -24,10 +24,11 @@ use crate::metadata::header;
 /// is tolerated), of an unsupported kind, or no longer of the size that was found when it was examined; [`Error::Limits`]
 /// if the memory is not to be had.
 pub fn photograph(source: &SourceImage) -> Result<Photograph> {
-    Ok(match stored(source)? {
+    let picture = match stored(source)? {
         Photograph::Eight(raster) => Photograph::Eight(upright(raster, source.orientation)),
         Photograph::Sixteen(raster) => Photograph::Sixteen(upright(raster, source.orientation)),
-    })
+    };
+    source.inset.cut(picture)
 }
 
 /// Bits of a sample in a photograph's file: 8 or 16, for floating point 16, 32 or 64.
@@ -50,7 +51,8 @@ pub fn sample_bits(source: &SourceImage) -> Result<u16> {
 pub fn decoding_surplus(sources: &[SourceImage]) -> usize {
     let surplus = |source: &SourceImage| {
         let pixel_bytes = header::open(&source.path).map_or(0, |(_, format)| format.pixel_bytes);
-        let pixels = source.width.saturating_mul(source.height);
+        let [width, height] = source.picture_size();
+        let pixels = width.saturating_mul(height);
         pixels.saturating_mul(pixel_bytes.saturating_sub(PLAIN_PIXEL_BYTES))
     };
     sources.iter().map(surplus).max().unwrap_or(0)
@@ -77,7 +79,8 @@ fn opened(source: &SourceImage) -> Result<(&'static Reading, Input)> {
         let reason = format!("it is not a {} picture", formats::readable_formats());
         Error::input(&source.name, reason, "Give the photograph again.")
     })?;
-    let room = source.width.saturating_mul(source.height).saturating_mul(format.pixel_bytes);
+    let [width, height] = source.picture_size();
+    let room = width.saturating_mul(height).saturating_mul(format.pixel_bytes);
     check_room(format_args!("decoding {}", source.name), room)?;
     Ok((format, input))
 }

@@ -1,6 +1,7 @@
 //! Photographs made small for people to look at, with as little decoding as that takes.
 
 use trueup_core::Result;
+use trueup_core::inset::Inset;
 use trueup_core::raster::{Photograph, Raster};
 use trueup_core::source::{SourceImage, WorkingFrame};
 
@@ -20,20 +21,27 @@ const FACTORS: [usize; 4] = [1, 2, 4, 8];
 /// # Errors
 /// As [`photograph`](super::photograph()).
 pub fn small(source: &SourceImage, max_pixels: f64) -> Result<Raster<u8>> {
-    let frame = WorkingFrame::new(source.width, source.height, max_pixels.max(1.0));
+    // Decoders reduce all of a picture: what lies beside the photograph goes afterwards.
+    let [width, height] = source.picture_size();
+    let share = (source.width as f64 / width as f64) * (source.height as f64 / height as f64);
+    let frame = WorkingFrame::new(width, height, (max_pixels / share).max(1.0));
     let (width, height) = whole_size(&frame);
     let stored = stored_of_at_least(source, [width, height])?;
     let colors = match stored {
         Photograph::Eight(raster) => reduced(&upright(raster, source.orientation), source, &frame),
         Photograph::Sixteen(raster) => reduced(&upright(raster, source.orientation), source, &frame),
     };
-    rgb8(&colors)
+    let scaled = |pixels: usize| (pixels as f64 * frame.working_from_full).round() as usize;
+    let Inset { left, top, right, bottom } = source.inset;
+    let inset = Inset { left: scaled(left), top: scaled(top), right: scaled(right), bottom: scaled(bottom) };
+    rgb8(&if inset.is_none() { colors } else { inset.cut_raster(&colors)? })
 }
 
 /// The rest of the way from what the decoder made of `source` to `frame`.
 fn reduced<T: reduce::ReducedSample>(picture: &Raster<T>, source: &SourceImage, frame: &WorkingFrame) -> Raster<f32> {
     // How many pixels along a side became one; what is left over at a border became one, too.
-    let sides = [(source.width, picture.width()), (source.height, picture.height())];
+    let [full_width, full_height] = source.picture_size();
+    let sides = [(full_width, picture.width()), (full_height, picture.height())];
     let is_made_by = |factor: &usize| sides.iter().all(|(full, made)| full.div_ceil(*factor) == *made);
     let factor = FACTORS.into_iter().find(is_made_by).unwrap_or(1);
     let (width, height) = whole_size(frame);

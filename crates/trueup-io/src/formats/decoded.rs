@@ -15,7 +15,8 @@ pub(crate) const HEADER_BYTES: usize = 64 << 20;
 
 /// Most bytes a decoder may take for this photograph.
 pub(crate) fn decoding_limit(source: &SourceImage) -> u64 {
-    let pixels = (source.width as u64).saturating_mul(source.height as u64);
+    let [width, height] = source.picture_size().map(|length| length as u64);
+    let pixels = width.saturating_mul(height);
     pixels.saturating_mul(MAX_PIXEL_BYTES).saturating_add(DECODER_SLACK_BYTES)
 }
 
@@ -50,9 +51,10 @@ fn spread_gray_alpha<T: Copy>(samples: &[T]) -> Vec<T> {
 
 /// The memory limit was judged by the size found when the file was examined, so it must still have that size.
 pub(crate) fn check_unchanged(source: &SourceImage, stored_width: usize, stored_height: usize) -> Result<()> {
+    let [width, height] = source.picture_size();
     let expected = match source.orientation {
-        5..=8 => (source.height, source.width),
-        _ => (source.width, source.height),
+        5..=8 => (height, width),
+        _ => (width, height),
     };
     if (stored_width, stored_height) == expected {
         return Ok(());

@@ -38,10 +38,14 @@ struct KnownLens {
 
 impl KnownLens {
     fn of(record: &ImageRecord) -> Option<Self> {
-        let (long, short) = (record.width.max(record.height) as f64, record.width.min(record.height) as f64);
+        // Other photographs are told apart by the pictures in their files, before what lies beside them is known.
+        let [width, height] = record.inset.outer([record.width, record.height]);
+        let (long, short) = (width.max(height) as f64, width.min(height) as f64);
         let focal = record.focal_px? / long;
-        let turned = Held::of(record.orientation, record.width, record.height);
-        let lens = turned.back(&record.lens.unwrap_or_default()).scaled(1.0 / long);
+        let turned = Held::of(record.orientation, width, height);
+        let lens = record.lens.unwrap_or_default();
+        let ([x, y], [right, down]) = (lens.center_px, record.inset.offset());
+        let lens = turned.back(&PlacedLens { center_px: [x + right, y + down], ..lens }).scaled(1.0 / long);
         let shape = long / short;
         let is_sane = FOCAL.contains(&focal)
             && shape.is_finite()

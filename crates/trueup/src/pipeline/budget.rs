@@ -98,7 +98,10 @@ impl Budget {
     /// [`Error::Limits`] with the numbers if the largest is too large to be measured alone.
     pub(super) fn measuring(&self, photographs: &FilePhotographs, working_pixels: f64) -> Result<Measuring> {
         let images = photographs.sources();
-        let bytes = |image: &SourceImage| image.width.saturating_mul(image.height).saturating_mul(PIXEL_BYTES);
+        let bytes = |image: &SourceImage| {
+            let [width, height] = image.picture_size();
+            width.saturating_mul(height).saturating_mul(PIXEL_BYTES)
+        };
         let Some(largest) = images.iter().max_by_key(|image| bytes(image)) else {
             return Ok(Measuring { at_once: usize::MAX, kept_bytes: 0, held_features: 0 });
         };

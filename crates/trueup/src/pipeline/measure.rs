@@ -9,6 +9,7 @@ use trueup_core::raster::Raster;
 use trueup_core::source::{PhotographSource, WorkingFrame};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::decode::FilePhotographs;
+use trueup_vision::border::even_border;
 use trueup_vision::features;
 use trueup_vision::lines;
 
@@ -220,9 +221,11 @@ fn measure(one: &OnePhotograph, options: &MeasureOptions, context: &StageContext
         curves = curves_outside(curves, &ignored, &frame);
         blacken(&mut thumbnail, &ignored, &picture.thumbnail_frame);
     }
+    let border = even_border(&picture.gray);
     let gray = keep_grays.then(|| eight_bit(&picture.gray));
     let features = ShelvedFeatures::Held(features);
-    Ok(Measured { frame, features, lines, curves, gray, thumbnail, thumbnail_frame: picture.thumbnail_frame })
+    let thumbnail_frame = picture.thumbnail_frame;
+    Ok(Measured { frame, features, lines, curves, gray, thumbnail, thumbnail_frame, border })
 }
 
 /// Gray values rounded to eight bits.

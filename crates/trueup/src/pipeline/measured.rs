@@ -6,6 +6,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::raster::Raster;
 use trueup_core::source::WorkingFrame;
+use trueup_vision::border::EvenBorder;
 use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
 
 use super::shelf::ShelvedFeatures;
@@ -23,6 +24,8 @@ pub(crate) struct Measured {
     pub gray: Option<Raster<u8>>,
     pub thumbnail: Raster<u8>,
     pub thumbnail_frame: WorkingFrame,
+    /// What is even at the picture's sides, in working pixels.
+    pub border: EvenBorder,
 }
 
 impl Serialize for Measured {
@@ -72,6 +75,7 @@ struct StoredMeasured {
     gray: Option<StoredRaster>,
     thumbnail: StoredRaster,
     thumbnail_frame: WorkingFrame,
+    border: EvenBorder,
 }
 
 impl StoredMeasured {
@@ -88,6 +92,7 @@ impl StoredMeasured {
             gray: measured.gray.as_ref().map(StoredRaster::new),
             thumbnail: StoredRaster::new(&measured.thumbnail),
             thumbnail_frame: measured.thumbnail_frame,
+            border: measured.border,
         })
     }
 
@@ -112,6 +117,7 @@ impl StoredMeasured {
             },
             thumbnail: self.thumbnail.restored()?,
             thumbnail_frame: self.thumbnail_frame,
+            border: self.border,
         })
     }
 }

@@ -1,11 +1,12 @@
 //! The order of the work, whole, and nowhere else:
 //!
-//! photographs -> [measure] -> [stacking] -> [matching] -> [align] -> [arrange] -> [compose] -> panorama
+//! photographs -> [measure] -> [borders] -> [stacking] -> [matching] -> [align] -> [arrange] -> [compose] -> panorama
 //!
 //! A phase is a function of its input, its options and a context; what it told on the way comes beside its product.
 
 pub(crate) mod align;
 pub(crate) mod arrange;
+mod borders;
 mod budget;
 pub(crate) mod compose;
 mod frames;
@@ -47,6 +48,7 @@ use trueup_vision::stacks::Fuse;
 use self::align::component::{camera_groups, camera_prior};
 use self::align::{AlignInput, Geometry};
 use self::arrange::{ArrangeInput, Arrangement};
+use self::borders::{BordersInput, Unbordered};
 use self::budget::Budget;
 use self::compose::{ComposeInput, Composed, LightInput, SmallPhotograph};
 use self::matched::Matched;
@@ -161,6 +163,8 @@ impl<'a> Stitcher<'a> {
             let input = MeasureInput { set: &found.value, memo, shelf, keep_grays, workers: self.workers };
             let measurements = measure::run(&input, &self.options.measure, context)?;
             let keeps_light = self.output.is_some_and(|path| self.options.compose.output.keeps_light(path));
+            let input = BordersInput { found, measurements, memo, shelf, keep_grays };
+            let Unbordered { found, measurements } = borders::run(input, self.options, context)?;
             let input = StackingInput { found, measurements, graph_file, memo, shelf, keep_grays, keeps_light };
             let Stacked { set, measurements, graph_file } = stacking::run(input, self.options, context)?;
             let mut matched = Matched::unmatched(set, measurements, graph_file)?;

@@ -9,6 +9,7 @@ use trueup_compose::exposure::{Correction, Corrections, Response};
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::geometry::{matrix_from_rows, rows_of};
+use trueup_core::inset::Inset;
 use trueup_core::lens::PlacedLens;
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::{SourceImage, StackMember};
@@ -49,6 +50,7 @@ pub(crate) fn unfilled(
             ImageRecord {
                 width: image.width,
                 height: image.height,
+                inset: image.inset,
                 orientation: image.orientation,
                 camera: image.camera_model.clone(),
                 lens_told: image.lens.is_some(),
@@ -131,6 +133,7 @@ pub(crate) fn left_out_record(path: String, reason: String, hint: String) -> Ima
         path,
         width: 0,
         height: 0,
+        inset: Inset::default(),
         orientation: 0,
         status: ImageStatus::LeftOut,
         reason,

@@ -239,10 +239,7 @@ pub(crate) fn find_photograph(
     options: &SourceOptions,
     context: &StageContext,
 ) -> Result<SourceImage> {
-    let find = |path: &str| {
-        let image = find_file(path, project_folder, options, context)?;
-        check_size(&image, record).map(|()| image)
-    };
+    let find = |path: &str| as_recorded(find_file(path, project_folder, options, context)?, record);
     let mut image = find(&record.path)?;
     for member in &record.stack {
         let source = find(&member.path)?;
@@ -306,22 +303,18 @@ fn check_stack(record: &ImageRecord) -> Result<()> {
     }
 }
 
-/// Refuses a photograph of another size than the recorded one's.
+/// The recorded photograph in the picture `image`.
 ///
 /// # Errors
-/// [`Error::Input`].
-pub(crate) fn check_size(image: &SourceImage, record: &ImageRecord) -> Result<()> {
-    if (image.width, image.height) == (record.width, record.height) {
-        return Ok(());
-    }
-    Err(Error::input(
-        image.path.display(),
-        format!(
-            "it is {} x {} px, the project has it at {} x {} px",
-            image.width, image.height, record.width, record.height
-        ),
-        "Give back the photograph that was stitched.",
-    ))
+/// [`Error::Input`] if the picture has another size than the recorded one.
+pub(crate) fn as_recorded(image: SourceImage, record: &ImageRecord) -> Result<SourceImage> {
+    let [width, height] = record.inset.outer([record.width, record.height]);
+    let other_size =
+        format!("it is {} x {} px, the project has it at {width} x {height} px", image.width, image.height);
+    let path = image.path.display().to_string();
+    let is_same = [image.width, image.height] == [width, height];
+    let inside = if is_same { image.inside(record.inset) } else { None };
+    inside.ok_or_else(|| Error::input(path, other_size, "Give back the photograph that was stitched."))
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use trueup_core::camera::Camera;
 use trueup_core::color::LightRange;
 use trueup_core::diagnostics::{Diagnostic, Severity};
 use trueup_core::geometry::matrix_from_rows;
+use trueup_core::inset::Inset;
 use trueup_core::lens::{Lens, PlacedLens};
 use trueup_core::matches::PairVerdict;
 use trueup_io::source::unique_names;
@@ -74,10 +75,14 @@ pub struct StackMemberRecord {
 pub struct ImageRecord {
     /// The file as it was given.
     pub path: String,
-    /// Width after orientation; 0 if the file could not be read.
+    /// Width after orientation, without [`Self::inset`]; 0 if the file could not be read.
     pub width: usize,
-    /// Height after orientation; 0 if the file could not be read.
+    /// Height after orientation, without [`Self::inset`]; 0 if the file could not be read.
     pub height: usize,
+    /// What of the picture in the file, as it is shown, lies beside the photograph: an even frame, or bars. All places in the record are the
+    /// photograph's own.
+    #[serde(default, skip_serializing_if = "Inset::is_none")]
+    pub inset: Inset,
     /// EXIF orientation (1 to 8) that was applied to the stored pixels; 0 in files of programs that did not record it.
     #[serde(default)]
     pub orientation: u8,

@@ -6,7 +6,7 @@ use trueup_core::source::{SourceImage, StackMember};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::{self, InMemory, RejectedSource, SourceOptions};
 
-use super::read::{check_size, find_photograph};
+use super::read::{as_recorded, find_photograph};
 use super::record::{self, ImageRecord, StackMemberRecord};
 use crate::report::several::several;
 
@@ -43,7 +43,7 @@ pub(crate) fn named_photographs(
     let found = records.iter().zip(names).map(|(record, name)| {
         let mut found = source::scan_with(std::slice::from_ref(name), in_memory, options, context)?;
         match (found.photographs.pop(), found.photographs.is_empty()) {
-            (Some(image), true) => check_size(&image, record).map(|()| image),
+            (Some(image), true) => as_recorded(image, record),
             (None, _) if !found.rejected.is_empty() => Err(found.rejected.swap_remove(0).to_error()),
             _ => Err(Error::input(name, "it is no single photograph", "")),
         }
@@ -81,7 +81,7 @@ pub(crate) fn other_photographs(
             Choice::Several => return Err(missing(format!("several files in {folder_text} have its name"))),
             Choice::None => return Err(missing(why_none(record, &folder_text, &sources.rejected))),
         };
-        check_size(&image, record)?;
+        let image = as_recorded(image, record)?;
         let stack = replaced_stack(record, &sources.photographs);
         Ok(SourceImage { stack, ..image })
     });
@@ -93,11 +93,12 @@ pub(crate) fn other_photographs(
 fn replaced_stack(record: &ImageRecord, others: &[SourceImage]) -> Vec<StackMember> {
     let replaced = |member: &StackMemberRecord| {
         let name = record::file_name(&member.path);
-        let is_named = |other: &&SourceImage| {
+        let named = |other: &SourceImage| {
             let file = file_name(&other.path);
-            (file == name || stem(&file) == stem(name)) && check_size(other, record).is_ok()
+            let is_named = file == name || stem(&file) == stem(name);
+            if is_named { as_recorded(other.clone(), record).ok() } else { None }
         };
-        let source = others.iter().find(is_named)?.clone();
+        let source = others.iter().find_map(named)?;
         Some(StackMember { source, reference_from_member: member.reference_from_member })
     };
     let all: Option<Vec<StackMember>> = record.stack.iter().map(replaced).collect();

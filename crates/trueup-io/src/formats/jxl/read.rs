@@ -145,7 +145,8 @@ pub(super) fn whole_fields(input: &mut Input, wanted: &[Tag]) -> Option<Vec<Fiel
 /// Decodes the first picture.
 pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
     input.rewind().map_err(|error| Error::io("reading", &source.path, error))?;
-    let pixels = source.width.saturating_mul(source.height);
+    let [width, height] = source.picture_size();
+    let pixels = width.saturating_mul(height);
     let limit = pixels.saturating_mul(PIXEL_BYTES).saturating_add(DECODER_SLACK_BYTES as usize);
     let Opened { mut image, mut pieces } = open(&mut input, limit).map_err(|error| damaged(source, error))?;
     let (width, height) = (image.width() as usize, image.height() as usize);

@@ -10,6 +10,7 @@ use std::fmt::Write;
 use nalgebra::{Matrix3, Matrix4, Vector2, Vector3, Vector4};
 use trueup_compose::exposure::Correction;
 use trueup_core::geometry::{matrix_from_rows, wrap_angle};
+use trueup_core::inset::Inset;
 use trueup_core::lens::{Lens, LensProjection, LensTerms, PlacedLens};
 use trueup_core::{Error, Result};
 
@@ -89,11 +90,11 @@ pub fn hugin_project(project: &Project) -> Result<String> {
 }
 
 fn image_line(image: &ImageRecord, camera_from_level: &Matrix3<f64>, focal_px: f64) -> Result<String> {
-    let quarter_turns = match image.orientation {
-        0 | 1 => 0.0,
-        6 => 1.0,
-        3 => 2.0,
-        8 => 3.0,
+    let quarter_turns: u8 = match image.orientation {
+        0 | 1 => 0,
+        6 => 1,
+        3 => 2,
+        8 => 3,
         _ => {
             return Err(Error::input(
                 &image.path,
@@ -102,16 +103,30 @@ fn image_line(image: &ImageRecord, camera_from_level: &Matrix3<f64>, focal_px: f
             ));
         }
     };
-    let (width, height) = match image.orientation {
-        6 | 8 => (image.height, image.width),
-        _ => (image.width, image.height),
+    let [upright_width, upright_height] = image.inset.outer([image.width, image.height]);
+    let (width, height) = match quarter_turns {
+        1 | 3 => (upright_height, upright_width),
+        _ => (upright_width, upright_height),
     };
+    let turn = f64::from(quarter_turns) * FRAC_PI_2;
     let Attitude { yaw, pitch, roll } = Attitude::of(camera_from_level);
-    let roll = wrap_angle(roll + quarter_turns * FRAC_PI_2);
-    let stored = StoredPicture { width: width as f64, height: height as f64, turn: quarter_turns * FRAC_PI_2 };
-    let lens = match &image.lens {
-        Some(lens) => HuginLens::of(lens, focal_px, &stored),
-        None => HuginLens::pinhole(focal_px, &stored),
+    let roll = wrap_angle(roll + turn);
+    let stored = StoredPicture { width: width as f64, height: height as f64, turn };
+    // Hugin counts from the middle of the picture in the file.
+    let [right, down] = image.inset.offset();
+    let lens = match image.lens {
+        None if image.inset.is_none() => HuginLens::pinhole(focal_px, &stored),
+        lens => {
+            let lens = lens.unwrap_or_default();
+            let [x, y] = lens.center_px;
+            HuginLens::of(&PlacedLens { center_px: [x + right, y + down], ..lens }, focal_px, &stored)
+        }
+    };
+    let crop = match image.inset.turned((4 - quarter_turns) % 4) {
+        inset if inset.is_none() => String::new(),
+        Inset { left, top, right, bottom } => {
+            format!(" S{left},{},{top},{}", width.saturating_sub(right), height.saturating_sub(bottom))
+        }
     };
     let HuginLens { format, field_of_view, radial: [a, b, c], center_px: [d, e] } = lens;
     let correction = image.correction.unwrap_or_else(|| Correction::uniform(image.gain.unwrap_or(1.0)));
@@ -120,7 +135,7 @@ fn image_line(image: &ImageRecord, camera_from_level: &Matrix3<f64>, focal_px: f
     // Hugin divides by the white balance, ours are factors; exposure values count stops by which a photograph is brightened.
     Ok(format!(
         "i w{width} h{height} f{format} v{:.6} r{:.6} p{:.6} y{:.6} TrX0 TrY0 TrZ0 a{a} b{b} c{c} d{d} e{e} g0 t0 Eev{:.6} Er{:.6} \
-         Eb{:.6} Ra0 Rb0 Rc0 Rd0 Re0 Va1 Vb{vb:.6} Vc{vc:.6} Vd{vd:.6} Vx0 Vy0 Vm5 n\"{}\"",
+         Eb{:.6} Ra0 Rb0 Rc0 Rd0 Re0 Va1 Vb{vb:.6} Vc{vc:.6} Vd{vd:.6} Vx0 Vy0 Vm5{crop} n\"{}\"",
         field_of_view.to_degrees(),
         roll.to_degrees(),
         pitch.to_degrees(),

@@ -1,0 +1,176 @@
+//! The borders phase: photographs that lie inside an even border in their files are measured again without it.
+
+use std::collections::BTreeMap;
+
+use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
+use trueup_core::inset::Inset;
+use trueup_core::source::{PhotographSource, SourceImage};
+use trueup_core::{Result, StageContext};
+use trueup_vision::border::EvenBorder;
+
+use super::light::WantedLight;
+use super::measure::{self, MeasureInput, Measurements};
+use super::measured::Measured;
+use super::photographs::{FoundPhotographs, PhotographSet};
+use super::shelf::Shelf;
+use crate::job::masks::AllMasks;
+use crate::memo::Memo;
+use crate::options::StitchOptions;
+
+/// Most that the borders of pictures of one size differ to be one and the same, in working pixels: a dark place or a bright one beside a
+/// border hides where it ends.
+const SAME_BORDER: usize = 2;
+
+/// What the phase works on: the photographs as they were given, and what was told of them.
+pub(super) struct BordersInput<'a> {
+    pub found: Reported<PhotographSet>,
+    pub measurements: Reported<Measurements>,
+    pub memo: Memo<'a>,
+    pub shelf: &'a Shelf<'a>,
+    pub keep_grays: bool,
+}
+
+/// Photographs without borders.
+pub(super) struct Unbordered {
+    pub found: Reported<PhotographSet>,
+    pub measurements: Reported<Measurements>,
+}
+
+/// Cuts the photographs that lie inside a border out of it and measures them again; without any, everything stays as it was.
+///
+/// # Errors
+/// [`trueup_core::Error::Limits`]; [`trueup_core::Error::Cancelled`].
+pub(super) fn run(input: BordersInput, options: &StitchOptions, context: &StageContext) -> Result<Unbordered> {
+    let BordersInput { found, mut measurements, memo, shelf, keep_grays } = input;
+    let insets = insets(&found.value.images, &measurements.value);
+    let images: Vec<SourceImage> = found
+        .value
+        .images
+        .iter()
+        .zip(&insets)
+        .map(|(image, &inset)| image.clone().inside(inset).unwrap_or_else(|| image.clone()))
+        .collect();
+    let cut: Vec<usize> = (0..images.len()).filter(|&number| images[number] != found.value.images[number]).collect();
+    if cut.is_empty() {
+        return Ok(Unbordered { found, measurements });
+    }
+    let (old, mut told) = found.split();
+    let masks = (0..images.len()).map(|number| old.files.masks(number).inside(insets[number])).collect();
+    let photographs = FoundPhotographs {
+        images,
+        in_memory: old.files.in_memory_photographs().clone(),
+        rejected: old.rejected,
+        masks: AllMasks { masks, records: old.masks },
+        light: WantedLight::Known(old.files.light()),
+    };
+    // What it says of the photographs' colors was told already.
+    let set = context.gather(|context| PhotographSet::open(photographs, options, context))?.value;
+    let set = PhotographSet { lens_from: old.lens_from, ..set };
+    let input = MeasureInput { set: &set, memo, shelf, keep_grays, workers: None };
+    let (again, told_again) = measure::some(&input, &cut, &options.measure, context)?.split();
+    // What was told of features and lines was of those with the border's.
+    measurements.findings.retain(|one| !matches!(one.subject, Subject::Photograph(number) if cut.contains(&number)));
+    measurements.findings.extend(told_again.findings);
+    for (stage, seconds) in told_again.seconds {
+        *measurements.seconds.entry(stage).or_default() += seconds;
+    }
+    let Measurements { photographs, keys } = again;
+    for (number, (one, key)) in cut.iter().copied().zip(photographs.into_iter().zip(keys)) {
+        measurements.value.photographs[number] = one;
+        measurements.value.keys[number] = key;
+    }
+    told.findings.extend(cut.iter().map(|&number| note(number, &set.images[number])));
+    Ok(Unbordered { found: told.map(|()| set), measurements })
+}
+
+/// What of each photograph's file lies beside it, in full pixels.
+fn insets(images: &[SourceImage], measurements: &Measurements) -> Vec<Inset> {
+    let mut of_size: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
+    for (number, image) in images.iter().enumerate().filter(|(number, _)| measurements.photographs[*number].is_ok()) {
+        of_size.entry([image.width, image.height]).or_default().push(number);
+    }
+    let mut insets = vec![Inset::default(); images.len()];
+    for members in of_size.values() {
+        let measured: Vec<&Measured> =
+            members.iter().filter_map(|&number| measurements.photographs[number].as_ref().ok()).collect();
+        let borders: Vec<EvenBorder> = measured.iter().map(|measured| measured.border).collect();
+        for ((&number, inset), measured) in members.iter().zip(of_one_size(&borders)).zip(&measured) {
+            let full = |pixels: usize| (pixels as f64 / measured.frame.working_from_full).ceil() as usize;
+            let [left, top, right, bottom] = sides(inset).map(full);
+            insets[number] = Inset { left, top, right, bottom };
+        }
+    }
+    insets
+}
+
+/// The borders of pictures of one size, which often have one in common. Half of them tell it; where it ends beside a sky as bright, or a
+/// night as dark, as itself, the others do.
+fn of_one_size(borders: &[EvenBorder]) -> Vec<Inset> {
+    let common: [Option<usize>; 4] = std::array::from_fn(|side| {
+        let mut widths: Vec<usize> =
+            borders.iter().map(|one| sides(one.border)[side]).filter(|&width| width > 0).collect();
+        widths.sort_unstable_by(|a, b| b.cmp(a));
+        let tell = |&width: &usize| widths.iter().filter(|&&other| is_same(width, other)).count();
+        widths.iter().copied().find(|width| 2 * tell(width) >= borders.len())
+    });
+    let inset = |one: &EvenBorder| {
+        let [left, top, right, bottom] = std::array::from_fn(|side| {
+            let (own, even) = (sides(one.border)[side], sides(one.even)[side]);
+            match common[side] {
+                Some(common) if is_same(common, own) || (own == 0 && even + 1 >= common) => common,
+                _ => own,
+            }
+        });
+        Inset { left, top, right, bottom }
+    };
+    borders.iter().map(inset).collect()
+}
+
+fn is_same(one: usize, other: usize) -> bool {
+    one.abs_diff(other) <= SAME_BORDER
+}
+
+fn note(number: usize, image: &SourceImage) -> Diagnostic {
+    let Inset { left, top, right, bottom } = image.inset;
+    let message = format!(
+        "it lies inside an even border, which is left out ({left}, {top}, {right} and {bottom} px at the left, top, right and bottom)"
+    );
+    Diagnostic::note(
+        "border-left-out",
+        Subject::Photograph(number),
+        message,
+        "If that is part of the picture, cut off one of its sides.",
+    )
+}
+
+fn sides(Inset { left, top, right, bottom }: Inset) -> [usize; 4] {
+    [left, top, right, bottom]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(border: [usize; 2], even: [usize; 2]) -> EvenBorder {
+        let inset = |[top, bottom]: [usize; 2]| Inset { top, bottom, ..Inset::default() };
+        EvenBorder { border: inset(border), even: inset(even) }
+    }
+
+    #[test]
+    fn photographs_of_one_film_share_its_border() {
+        let told = [
+            rows([13, 13], [12, 12]),
+            rows([12, 13], [11, 12]),
+            // Its sky is as bright as the border.
+            rows([0, 0], [40, 12]),
+            // Nothing of it is even, or not enough.
+            rows([0, 0], [0, 11]),
+        ];
+        let found = of_one_size(&told).into_iter().map(|Inset { top, bottom, .. }| [top, bottom]);
+        assert_eq!(found.collect::<Vec<_>>(), [[13, 13], [13, 13], [13, 13], [0, 0]]);
+        // One of four tells nothing of the others.
+        let alone = [told[0], rows([0, 0], [40, 40]), rows([0, 0], [40, 40]), rows([0, 0], [0, 0])];
+        assert_eq!(of_one_size(&alone)[1], Inset::default());
+        assert_eq!(of_one_size(&alone)[0].top, 13);
+    }
+}
