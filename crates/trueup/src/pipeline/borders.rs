@@ -117,7 +117,8 @@ fn of_one_size(borders: &[EvenBorder]) -> Vec<Inset> {
         let [left, top, right, bottom] = std::array::from_fn(|side| {
             let (own, even) = (sides(one.border)[side], sides(one.even)[side]);
             match common[side] {
-                Some(common) if is_same(common, own) || (own == 0 && even + 1 >= common) => common,
+                Some(common) if own == 0 && even + 1 >= common => common,
+                Some(common) if own > 0 && is_same(common, own) => common,
                 _ => own,
             }
         });
@@ -168,6 +169,9 @@ mod tests {
         ];
         let found = of_one_size(&told).into_iter().map(|Inset { top, bottom, .. }| [top, bottom]);
         assert_eq!(found.collect::<Vec<_>>(), [[13, 13], [13, 13], [13, 13], [0, 0]]);
+        // As narrow as what borders may differ by, it is still none of those that show nothing of it.
+        let narrow = of_one_size(&[rows([2, 2], [1, 1]), rows([0, 0], [0, 0])]);
+        assert_eq!(narrow[1], Inset::default());
         // One of four tells nothing of the others.
         let alone = [told[0], rows([0, 0], [40, 40]), rows([0, 0], [40, 40]), rows([0, 0], [0, 0])];
         assert_eq!(of_one_size(&alone)[1], Inset::default());
