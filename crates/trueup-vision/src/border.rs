@@ -165,8 +165,8 @@ mod tests {
             if x.hypot(y) < 70.0 { 120.0 + (x * 0.3) } else { 0.0 }
         };
         assert_eq!(even(&picture(circle)), none, "a fisheye's circle");
-        let sky = even_border(&picture(skyline)).even;
-        assert_eq!(sky, Inset { top: 30, ..none }, "lines that a border of other photographs may lie in");
+        let sky = even_border(&picture(skyline)).even.top;
+        assert_eq!(sky, 30, "lines that a border of other photographs may lie in");
         assert_eq!(even(&Raster::new(0, 0, 1)), none);
         assert_eq!(even(&Raster::new(1, 1, 1)), none);
     }
