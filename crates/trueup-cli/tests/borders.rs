@@ -55,6 +55,12 @@ fn prints_are_stitched_without_their_paper_and_composed_again() {
         4,
         "{hugin}"
     );
+    finish(trueup(desk.path(), &["compose", "pano.pto", "-o", "of-hugin.png", "--project", "of-hugin.json"]))
+        .expect_success();
+    let of_hugin = desk.json("of-hugin.json");
+    for number in 0..4 {
+        assert_eq!(of_hugin["images"][number]["inset"], project["images"][number]["inset"]);
+    }
     finish(trueup(desk.path(), &["compose", "pano.json", "-o", "again.png"])).expect_success();
     assert!(desk.read("pano.png") == desk.read("again.png"), "the same panorama");
     // White paper would be all along the outline; above and below, sky and pavement are as bright.

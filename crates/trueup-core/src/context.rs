@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::diagnostics::{Diagnostic, Reported};
+use crate::diagnostics::{Diagnostic, Reported, add_seconds};
 use crate::error::{Error, Result};
 
 /// Receives the progress of long work. Called from any thread.
@@ -192,9 +192,7 @@ impl<'a> StageContext<'a> {
     pub fn absorb<T>(&self, part: Reported<T>) -> T {
         let mut sink = self.sink();
         sink.findings.extend(part.findings);
-        for (stage, seconds) in part.seconds {
-            *sink.seconds.entry(stage).or_default() += seconds;
-        }
+        add_seconds(&mut sink.seconds, part.seconds);
         part.value
     }
 }

@@ -132,6 +132,13 @@ pub struct Reported<T> {
     pub seconds: BTreeMap<String, f64>,
 }
 
+/// Adds wall seconds by the name of the stage that took them to those told before.
+pub fn add_seconds(seconds: &mut BTreeMap<String, f64>, more: BTreeMap<String, f64>) {
+    for (stage, spent) in more {
+        *seconds.entry(stage).or_default() += spent;
+    }
+}
+
 impl<T> Reported<T> {
     /// The same findings beside what `change` makes of the product.
     pub fn map<U>(self, change: impl FnOnce(T) -> U) -> Reported<U> {

@@ -19,6 +19,23 @@ pub struct Inset {
 }
 
 impl Inset {
+    /// Columns and rows at the left, top, right and bottom.
+    pub fn sides(&self) -> [usize; 4] {
+        let Self { left, top, right, bottom } = *self;
+        [left, top, right, bottom]
+    }
+
+    /// The inset of so many columns and rows at the left, top, right and bottom.
+    pub fn from_sides([left, top, right, bottom]: [usize; 4]) -> Self {
+        Self { left, top, right, bottom }
+    }
+
+    /// The inset whose every side is what `of` makes of this one's.
+    #[must_use]
+    pub fn map(self, of: impl FnMut(usize) -> usize) -> Self {
+        Self::from_sides(self.sides().map(of))
+    }
+
     /// Whether the photograph is the whole picture.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
@@ -47,13 +64,9 @@ impl Inset {
     /// The inset of the picture turned clockwise by so many quarters.
     #[must_use]
     pub fn turned(self, quarters: u8) -> Self {
-        let Self { left, top, right, bottom } = self;
-        match quarters % 4 {
-            1 => Self { left: bottom, top: left, right: top, bottom: right },
-            2 => Self { left: right, top: bottom, right: left, bottom: top },
-            3 => Self { left: top, top: right, right: bottom, bottom: left },
-            _ => self,
-        }
+        let mut sides = self.sides();
+        sides.rotate_right(usize::from(quarters % 4));
+        Self::from_sides(sides)
     }
 
     /// The photograph in `picture`.

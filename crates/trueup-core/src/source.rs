@@ -155,13 +155,8 @@ impl SourceImage {
             let [x, y] = lens.center_px;
             PlacedLens { center_px: [x - right, y - down], ..lens }
         };
-        let sides = |one: usize, more: usize| one.saturating_add(more);
-        let inset = Inset {
-            left: sides(self.inset.left, inset.left),
-            top: sides(self.inset.top, inset.top),
-            right: sides(self.inset.right, inset.right),
-            bottom: sides(self.inset.bottom, inset.bottom),
-        };
+        let (outer, inner) = (self.inset.sides(), inset.sides());
+        let inset = Inset::from_sides(std::array::from_fn(|side| outer[side].saturating_add(inner[side])));
         let (focal_prior, lens) = (self.focal_prior.map(of_photograph), self.lens.map(moved));
         Some(Self { width, height, inset, focal_prior, lens, ..self })
     }

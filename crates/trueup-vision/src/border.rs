@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 use trueup_core::inset::Inset;
 use trueup_core::raster::Raster;
-use trueup_core::statistics::median;
+use trueup_core::statistics::median_of;
 
 /// Most that samples of an even border differ from its own level, in gray levels: compression moves them so far.
 const EVEN: f32 = 10.0;
@@ -39,7 +39,7 @@ pub struct EvenBorder {
 /// It counts only together with one of the same level at the opposite side: a blown sky above a level sea has that line, too.
 pub fn even_border(gray: &Raster<f32>) -> EvenBorder {
     let [columns, rows] = [Line::Column, Line::Row].map(|line| {
-        let sides = [false, true].map(|from_end| Side { gray, line, from_end }.border().unwrap_or_default());
+        let sides = [false, true].map(|from_end| Side { gray, line, from_end }.even_lines().unwrap_or_default());
         let [one, other] = sides;
         let is_border = one.ends && other.ends && (one.level - other.level).abs() <= SAME_LEVEL;
         // The line after the last even one holds some of both.
@@ -76,10 +76,10 @@ struct EvenLines {
 
 impl Side<'_> {
     /// `None` in a picture without pixels.
-    fn border(&self) -> Option<EvenLines> {
+    fn even_lines(&self) -> Option<EvenLines> {
         let (width, height) = (self.gray.width(), self.gray.height());
         let across = if self.line == Line::Row { height } else { width };
-        let level = median(&mut self.samples(0)?.collect::<Vec<f32>>())?;
+        let level = median_of(self.samples(0)?)?;
         let most = (WIDEST * across as f64) as usize;
         let is_even = |&depth: &usize| self.share(depth, |sample| (sample - level).abs() <= EVEN) >= MOST_OF_A_LINE;
         let even = (0..=most).take_while(is_even).count();

@@ -1,7 +1,6 @@
 //! Photographs made small for people to look at, with as little decoding as that takes.
 
 use trueup_core::Result;
-use trueup_core::inset::Inset;
 use trueup_core::raster::{Photograph, Raster};
 use trueup_core::source::{SourceImage, WorkingFrame};
 
@@ -32,8 +31,7 @@ pub fn small(source: &SourceImage, max_pixels: f64) -> Result<Raster<u8>> {
         Photograph::Sixteen(raster) => reduced(&upright(raster, source.orientation), source, &frame),
     };
     let scaled = |pixels: usize| (pixels as f64 * frame.working_from_full).round() as usize;
-    let Inset { left, top, right, bottom } = source.inset;
-    let inset = Inset { left: scaled(left), top: scaled(top), right: scaled(right), bottom: scaled(bottom) };
+    let inset = source.inset.map(scaled);
     rgb8(&if inset.is_none() { colors } else { inset.cut_raster(&colors)? })
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
+use trueup_core::diagnostics::{Diagnostic, Reported, Subject, add_seconds};
 use trueup_core::inset::Inset;
 use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Result, StageContext};
@@ -43,19 +43,14 @@ pub(super) struct Unbordered {
 pub(super) fn run(input: BordersInput, options: &StitchOptions, context: &StageContext) -> Result<Unbordered> {
     let BordersInput { found, mut measurements, memo, shelf, keep_grays } = input;
     let insets = insets(&found.value.images, &measurements.value);
-    let images: Vec<SourceImage> = found
-        .value
-        .images
-        .iter()
-        .zip(&insets)
-        .map(|(image, &inset)| image.clone().inside(inset).unwrap_or_else(|| image.clone()))
-        .collect();
-    let cut: Vec<usize> = (0..images.len()).filter(|&number| images[number] != found.value.images[number]).collect();
+    let cut: Vec<usize> = (0..insets.len()).filter(|&number| !insets[number].is_none()).collect();
     if cut.is_empty() {
         return Ok(Unbordered { found, measurements });
     }
     let (old, mut told) = found.split();
-    let masks = (0..images.len()).map(|number| old.files.masks(number).inside(insets[number])).collect();
+    let inside = |(image, &inset): (&SourceImage, &Inset)| image.clone().inside(inset);
+    let images = old.images.iter().zip(&insets).map(|one| inside(one).unwrap_or_else(|| one.0.clone())).collect();
+    let masks = (0..insets.len()).map(|number| old.files.masks(number).inside(insets[number])).collect();
     let photographs = FoundPhotographs {
         images,
         in_memory: old.files.in_memory_photographs().clone(),
@@ -69,11 +64,11 @@ pub(super) fn run(input: BordersInput, options: &StitchOptions, context: &StageC
     let input = MeasureInput { set: &set, memo, shelf, keep_grays, workers: None };
     let (again, told_again) = measure::some(&input, &cut, &options.measure, context)?.split();
     // What was told of features and lines was of those with the border's.
-    measurements.findings.retain(|one| !matches!(one.subject, Subject::Photograph(number) if cut.contains(&number)));
+    measurements
+        .findings
+        .retain(|one| !matches!(one.subject, Subject::Photograph(number) if !insets[number].is_none()));
     measurements.findings.extend(told_again.findings);
-    for (stage, seconds) in told_again.seconds {
-        *measurements.seconds.entry(stage).or_default() += seconds;
-    }
+    add_seconds(&mut measurements.seconds, told_again.seconds);
     let Measurements { photographs, keys } = again;
     for (number, (one, key)) in cut.iter().copied().zip(photographs.into_iter().zip(keys)) {
         measurements.value.photographs[number] = one;
@@ -90,14 +85,17 @@ fn insets(images: &[SourceImage], measurements: &Measurements) -> Vec<Inset> {
         of_size.entry([image.width, image.height]).or_default().push(number);
     }
     let mut insets = vec![Inset::default(); images.len()];
-    for members in of_size.values() {
+    for (&size, members) in &of_size {
         let measured: Vec<&Measured> =
             members.iter().filter_map(|&number| measurements.photographs[number].as_ref().ok()).collect();
         let borders: Vec<EvenBorder> = measured.iter().map(|measured| measured.border).collect();
         for ((&number, inset), measured) in members.iter().zip(of_one_size(&borders)).zip(&measured) {
             let full = |pixels: usize| (pixels as f64 / measured.frame.working_from_full).ceil() as usize;
-            let [left, top, right, bottom] = sides(inset).map(full);
-            insets[number] = Inset { left, top, right, bottom };
+            let inset = inset.map(full);
+            // Of a picture of a few pixels, nothing may be left.
+            if inset.inner(size).is_some() {
+                insets[number] = inset;
+            }
         }
     }
     insets
@@ -108,21 +106,20 @@ fn insets(images: &[SourceImage], measurements: &Measurements) -> Vec<Inset> {
 fn of_one_size(borders: &[EvenBorder]) -> Vec<Inset> {
     let common: [Option<usize>; 4] = std::array::from_fn(|side| {
         let mut widths: Vec<usize> =
-            borders.iter().map(|one| sides(one.border)[side]).filter(|&width| width > 0).collect();
+            borders.iter().map(|one| one.border.sides()[side]).filter(|&width| width > 0).collect();
         widths.sort_unstable_by(|a, b| b.cmp(a));
         let tell = |&width: &usize| widths.iter().filter(|&&other| is_same(width, other)).count();
         widths.iter().copied().find(|width| 2 * tell(width) >= borders.len())
     });
     let inset = |one: &EvenBorder| {
-        let [left, top, right, bottom] = std::array::from_fn(|side| {
-            let (own, even) = (sides(one.border)[side], sides(one.even)[side]);
+        Inset::from_sides(std::array::from_fn(|side| {
+            let (own, even) = (one.border.sides()[side], one.even.sides()[side]);
             match common[side] {
                 Some(common) if own == 0 && even + 1 >= common => common,
                 Some(common) if own > 0 && is_same(common, own) => common,
                 _ => own,
             }
-        });
-        Inset { left, top, right, bottom }
+        }))
     };
     borders.iter().map(inset).collect()
 }
@@ -132,7 +129,7 @@ fn is_same(one: usize, other: usize) -> bool {
 }
 
 fn note(number: usize, image: &SourceImage) -> Diagnostic {
-    let Inset { left, top, right, bottom } = image.inset;
+    let [left, top, right, bottom] = image.inset.sides();
     let message = format!(
         "it lies inside an even border, which is left out ({left}, {top}, {right} and {bottom} px at the left, top, right and bottom)"
     );
@@ -142,10 +139,6 @@ fn note(number: usize, image: &SourceImage) -> Diagnostic {
         message,
         "If that is part of the picture, cut off one of its sides.",
     )
-}
-
-fn sides(Inset { left, top, right, bottom }: Inset) -> [usize; 4] {
-    [left, top, right, bottom]
 }
 
 #[cfg(test)]

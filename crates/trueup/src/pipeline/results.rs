@@ -7,7 +7,7 @@ use trueup_compose::crop::{self, Frame, Rectangle};
 use trueup_compose::exposure::Corrections;
 use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::RenderInput;
-use trueup_core::diagnostics::Reported;
+use trueup_core::diagnostics::{Reported, add_seconds};
 use trueup_core::lines::LineSegment;
 use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_io::decode::FilePhotographs;
@@ -140,8 +140,6 @@ impl Alignment {
     pub(crate) fn record(&mut self, told: Reported<()>) {
         let told = told.renumbered(|number| self.position_of(number));
         self.project.diagnostics.extend(told.findings);
-        for (stage, seconds) in told.seconds {
-            *self.project.seconds.entry(stage).or_default() += seconds;
-        }
+        add_seconds(&mut self.project.seconds, told.seconds);
     }
 }

@@ -321,8 +321,8 @@ mod tests {
         };
         let line = image_line(&record, &camera_from_level, 670.0).expect("a line");
         let read = HuginProject::parse(&format!("# hugin project file\n{line}\n"), "a.pto").expect("a project");
-        let HuginImage { path, width, height, focal_px, lens: found, attitude } = &read.images[0];
-        assert_eq!((path.as_str(), *width, *height), ("a b.jpg", 800, 600));
+        let HuginImage { path, width, height, focal_px, lens: found, inset, attitude } = &read.images[0];
+        assert_eq!((path.as_str(), *width, *height, *inset), ("a b.jpg", 800, 600, Inset::default()));
         let upright = found.expect("a lens").turned(1);
         assert!((upright.center_px[0] - 5.0).abs() < 1e-9 && (upright.center_px[1] - 2.0).abs() < 1e-9, "{upright:?}");
         let [yaw, pitch, roll] = attitude;

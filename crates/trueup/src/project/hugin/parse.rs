@@ -23,6 +23,8 @@ pub(super) struct Fields {
     numbers: BTreeMap<String, f64>,
     /// The file's name; empty where there is none.
     pub name: String,
+    /// Left, right, top and bottom of what is used of a photograph (`S`).
+    pub crop: Option<[f64; 4]>,
 }
 
 impl Fields {
@@ -113,7 +115,7 @@ impl<'a> Line<'a> {
     /// The numbers of the line; those that are those of another photograph (`v=0`) are taken from there.
     fn resolved(&self, images: &[Self]) -> std::result::Result<Fields, String> {
         let mut numbers = BTreeMap::new();
-        let mut file_name = String::new();
+        let (mut file_name, mut crop) = (String::new(), None);
         for (&name, &value) in &self.fields {
             if let Some(quoted) = value.strip_prefix('"') {
                 if name == "n" {
@@ -129,7 +131,11 @@ impl<'a> Line<'a> {
                 }
                 None => value,
             };
-            // What is no number (crops, lists of steps) is not among what is read here.
+            if name == "S" {
+                crop = Some(numbers_of(stated).ok_or_else(|| format!("S{stated} is no crop"))?);
+                continue;
+            }
+            // What is no number (lists of steps) is not among what is read here.
             if let Ok(number) = stated.parse::<f64>() {
                 if !number.is_finite() {
                     return Err(format!("{name} is no finite number"));
@@ -139,8 +145,14 @@ impl<'a> Line<'a> {
                 return Err(format!("{name} is that of a photograph whose own is that of another"));
             }
         }
-        Ok(Fields { line: self.number, numbers, name: file_name })
+        Ok(Fields { line: self.number, numbers, name: file_name, crop })
     }
+}
+
+/// As many finite numbers, between commas.
+fn numbers_of<const COUNT: usize>(text: &str) -> Option<[f64; COUNT]> {
+    let numbers = text.split(',').map(|number| number.parse().ok().filter(|number: &f64| number.is_finite()));
+    numbers.collect::<Option<Vec<f64>>>()?.try_into().ok()
 }
 
 #[cfg(test)]
@@ -160,6 +172,7 @@ mod tests {
         assert_eq!((images[0].name.as_str(), images[1].name.as_str()), ("a 1.jpg", "b.jpg"));
         let of = |name| (images[0].number(name), images[1].number(name));
         assert_eq!((of("v"), of("b"), of("e")), ((50.5, 50.5), (-0.02, -0.02), (-2.0, -2.0)));
+        assert_eq!((images[0].crop, images[1].crop), (None, Some([0.0, 800.0, 0.0, 600.0])));
         assert_eq!((of("p"), of("y"), of("TrX")), ((2.0, 10.0), (-10.0, 10.0), (0.0, 0.0)));
         assert_eq!((images[0].number("Vm"), images[1].number("Vm"), images[1].line), (5.0, 0.0, 5));
     }
@@ -173,6 +186,7 @@ mod tests {
         assert!(refused(&TWO.replace("v=0", "v=1")).contains("line 5: v is that of a photograph"));
         assert!(refused(&TWO.replace("v50.5", "v1e999")).contains("line 4: v is no finite number"));
         assert!(refused(&TWO.replace("n\"b.jpg\"", "n\"b.jpg")).contains("line 5: the text of n does not end"));
+        assert!(refused(&TWO.replace("S0,800,0,600", "S0,800,0")).contains("line 5: S0,800,0 is no crop"));
         assert!(refused(&TWO.replace("w800 h600 f0 v=0", "w800 600")).contains("line 5: a field without a name"));
         assert!(refused("i w1 h1 n\"a\"\no f0 y1\n").contains("PTOptimizer"));
     }

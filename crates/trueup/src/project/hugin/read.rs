@@ -10,6 +10,7 @@ use trueup_compose::exposure::Corrections;
 use trueup_compose::layout::Placed;
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z, rows_of};
+use trueup_core::inset::Inset;
 use trueup_core::lens::{Lens, LensProjection, LensTerms, PlacedLens};
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::SourceImage;
@@ -46,6 +47,8 @@ pub struct HuginImage {
     pub focal_px: f64,
     /// Before the stored picture; nothing of a pinhole.
     pub lens: Option<PlacedLens>,
+    /// What of the stored picture is left out at its sides.
+    pub inset: Inset,
     /// Yaw to the right, pitch upwards and clockwise roll of the stored picture, radians.
     pub attitude: [f64; 3],
 }
@@ -207,18 +210,26 @@ impl Photograph {
             );
             return Err(Error::input(&image.path, reason, "Give back the photograph that was aligned."));
         }
+        let inset = image.inset.turned(quarters);
+        let Some([width, height]) = inset.inner([source.width, source.height]) else {
+            return Err(Error::input(&image.path, "nothing is left of it inside its crop", "Crop it less in Hugin."));
+        };
+        // Hugin counts from the middle of the picture in the file.
+        let ([right, down], mut lens) = (inset.offset(), image.lens.unwrap_or_default().turned(quarters));
+        lens.center_px = [lens.center_px[0] - right, lens.center_px[1] - down];
         let [yaw, pitch, roll] = image.attitude;
         let roll = roll - f64::from(quarters) * 0.5 * PI;
         let level_from_camera = rotation_about_y(yaw) * rotation_about_x(pitch) * rotation_about_z(roll);
         let record = ImageRecord {
-            width: source.width,
-            height: source.height,
+            width,
+            height,
+            inset,
             orientation: source.orientation,
             status: ImageStatus::Used,
             component: Some(0),
             camera: source.camera_model.clone(),
             focal_px: Some(image.focal_px),
-            lens: image.lens.map(|lens| lens.turned(quarters)),
+            lens: (lens != PlacedLens::default()).then_some(lens),
             rotation: Some(rows_of(&level_from_camera.transpose())),
             ..left_out_record(source.path.display().to_string(), String::new(), String::new())
         };
@@ -279,6 +290,16 @@ impl HuginImage {
         if center_px.iter().any(|offset| offset.abs() > 0.5 * width.max(height)) {
             return Err(wrong("its center (d, e) lies outside of it".to_owned(), again));
         }
+        // A circle around a fisheye's picture may reach beyond it.
+        let inset = fields.crop.map(|[left, right, top, bottom]| {
+            Inset::from_sides(
+                [left, top, width - right, height - bottom].map(|beside| beside.max(0.0).round() as usize),
+            )
+        });
+        let inset = inset.unwrap_or_default();
+        if inset.inner([width as usize, height as usize]).is_none() {
+            return Err(wrong("its crop (S) leaves nothing of it".to_owned(), "Crop it less in Hugin."));
+        }
         let attitude = ["y", "p", "r"].map(|name| fields.number(name).to_radians());
         let hint = "Optimise the lens again, with b alone.";
         let (terms, stretch) = polynomial
@@ -291,6 +312,7 @@ impl HuginImage {
             height: height as usize,
             focal_px: focal_px * stretch,
             lens: (lens != PlacedLens::default()).then_some(lens),
+            inset,
             attitude,
         })
     }

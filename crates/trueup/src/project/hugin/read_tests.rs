@@ -52,6 +52,15 @@ fn lenses_bend_as_hugins() {
     }
 }
 
+/// Hugin's order is left, right, top, bottom; a circle may reach beyond the picture.
+#[test]
+fn what_is_cropped_is_left_out() {
+    let inset = |image: &str| project(image).expect("a project").images[0].inset.sides();
+    assert_eq!(inset("f0 v60 S10,780,30,560"), [10, 30, 20, 40]);
+    assert_eq!(inset("f2 v180 S-20,820,-100,700"), [0; 4]);
+    assert!(project("f0 v60 S500,400,0,600").expect_err("nothing").to_string().contains("its crop (S) leaves nothing"));
+}
+
 #[test]
 fn what_is_not_read_is_named() {
     let refused = |image: &str| project(image).expect_err("refused").to_string();
