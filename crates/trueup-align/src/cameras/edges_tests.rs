@@ -36,8 +36,13 @@ fn edges(cameras: &[Camera], noise_px: f64) -> Vec<Vec<EdgeCurve>> {
 fn of_a_pair(truth: &[Camera], curves: &[Vec<EdgeCurve>]) -> (Cameras, Vec<String>) {
     let pairs = matched(truth, 0.3, 0.0);
     let curves: Vec<&[EdgeCurve]> = curves.iter().map(Vec::as_slice).collect();
-    let input =
-        CameraInput { priors: &[CameraPrior::unknown(frame(), 0); 2], pairs: &pairs, curves: &curves, reference: 0 };
+    let input = CameraInput {
+        priors: &[CameraPrior::unknown(frame(), 0); 2],
+        pairs: &pairs,
+        curves: &curves,
+        lines: &[],
+        reference: 0,
+    };
     let found =
         StageContext::default().gather(|context| run(&input, &CameraOptions::default(), context)).expect("solvable");
     (found.value, found.findings.into_iter().map(|finding| finding.code).collect())

@@ -3,15 +3,20 @@
 //! A rotating camera's focal length is seen in how an overlap is stretched from one photograph to the other. A step aside
 //! stretches it as well, as another focal length would: before a wall that is seen head on, one that is twice as long. What
 //! remains is how badly matches meet, and that grows little over a wide range of focal lengths. So where they do not meet to the error of a feature,
-//! metadata, or what is usual, have their say.
+//! the directions of lines ([`super::directions`]) and metadata, or what is usual, have their say.
 //!
 //! # Source
 //! The focal length that is most probable by Bayes' theorem. Errors of unknown size are integrated out (Gelman and others, "Bayesian Data
 //! Analysis", section 3.2): the likelihood of n of them falls as their mean square to the power of n / 2.
 
+use nalgebra::Matrix3;
+use trueup_core::camera::Camera;
+use trueup_core::lines::LineSegment;
+use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 
 use super::bundle::{BundleAdjustment, FINE_HUBER_PX, Parameters};
+use super::directions::{FocalByLines, peak};
 use super::intrinsics::IntrinsicsModel;
 use super::options::CameraOptions;
 use super::prior::{CameraPrior, USUAL_FOCAL_SD};
@@ -22,26 +27,47 @@ const FEATURE_ERROR_PX: f64 = 0.5;
 const INDEPENDENT_PARTS: f64 = 4.0;
 /// More overlaps tell focal lengths without help.
 const MOST_OVERLAPS: usize = 30;
-/// Distance from what is expected, in its standard deviations, up to which nothing is asked: it would hardly move anything.
+/// Distance from what is expected, in its standard deviations, up to which it is not asked: it would hardly move anything.
 const AS_EXPECTED: f64 = 0.5;
-/// Steps of the search between what matches say and what is expected.
-const STEPS: usize = 12;
+/// Step of the search, as the logarithm of a factor. Reasoned: half of what lines scatter by at their surest.
+const STEP: f64 = 0.08;
+/// How far the search goes beyond what matches say and what is expected, in the same terms, where lines are asked.
+const BEYOND: f64 = 0.4;
+/// How improbable the focal lengths one step aside are by matches that are so sure of theirs, twice as sure as lines, that these are not asked.
+const SURE: f64 = 7.0;
 
 /// Cameras with focal lengths in which what is expected of them takes part.
 pub(super) struct ExpectedFocal {
     pub parameters: Parameters,
+    pub opened: OpenFocal,
+}
+
+/// What else than matches came to of focal lengths that these leave open.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OpenFocal {
     /// By which factor the focal lengths are those of the matches.
     pub factor: f64,
+    /// Whether lines took part, beside what is expected.
+    pub by_lines: bool,
+}
+
+/// Cameras whose focal lengths are longer than those of the matches by a factor.
+struct Candidate {
+    log_factor: f64,
+    parameters: Parameters,
+    /// Minus twice the logarithm of its probability by the matches.
+    improbable: f64,
 }
 
 /// The cameras of `found`, refined without lenses, with the focal lengths that are most probable; `None` where matches are sure of theirs, or
-/// tell what is expected.
+/// tell what is expected, and `lines` say nothing else.
 ///
 /// # Errors
 /// [`trueup_core::Error::Cancelled`].
 pub(super) fn expected(
     problem: &BundleAdjustment<'_>,
     found: &Parameters,
+    lines: &[Vec<LineSegment>],
     options: &CameraOptions,
     context: &StageContext,
 ) -> Result<Option<ExpectedFocal>> {
@@ -51,27 +77,67 @@ pub(super) fn expected(
     // Both directions of every match.
     let mean_square = |at: &Parameters| problem.matches_cost(at, FINE_HUBER_PX) / (2 * matches).max(1) as f64;
     let by_matches = mean_square(found);
-    let is_sure = by_matches.sqrt() <= FEATURE_ERROR_PX;
-    if is_sure || overlaps > MOST_OVERLAPS || expectation.off.abs() <= AS_EXPECTED * expectation.sd {
+    if by_matches.sqrt() <= FEATURE_ERROR_PX || overlaps > MOST_OVERLAPS {
         return Ok(None);
     }
     // What features err by is independent; its share in the errors falls with their square.
     let own = (FEATURE_ERROR_PX.powi(2) / by_matches).powi(2);
     let independent = INDEPENDENT_PARTS * overlaps as f64 + own * matches as f64;
     let fixed = IntrinsicsModel::fixed(problem.priors.len());
-    let mut best: Option<(f64, ExpectedFocal)> = None;
-    let mut at = found.clone();
-    for step in 0..=STEPS {
+    // Rotations that were found for one focal length are near those for the next.
+    let candidate = |log_factor: f64, rotations: &[Matrix3<f64>]| -> Result<Candidate> {
         context.check_cancelled()?;
-        let factor = (-expectation.off * step as f64 / STEPS as f64).exp();
-        at.focal_px = found.focal_px.iter().map(|focal_px| focal_px * factor).collect();
-        at = problem.minimize(at, &fixed, FINE_HUBER_PX, context)?;
-        let improbable = independent * (mean_square(&at) / by_matches).ln() + expectation.improbable(factor);
-        if best.as_ref().is_none_or(|(least, _)| improbable < *least) {
-            best = Some((improbable, ExpectedFocal { parameters: at.clone(), factor }));
+        let focal_px = found.focal_px.iter().map(|focal_px| focal_px * log_factor.exp()).collect();
+        let start = Parameters { focal_px, rotations: rotations.to_vec(), lenses: found.lenses.clone() };
+        let parameters = problem.minimize(start, &fixed, FINE_HUBER_PX, context)?;
+        let improbable = independent * (mean_square(&parameters) / by_matches).ln();
+        Ok(Candidate { log_factor, parameters, improbable })
+    };
+    let extend = |side: &mut Vec<Candidate>, end: f64| -> Result<()> {
+        while let Some(last) = side.last().filter(|last| last.log_factor.abs() < end.abs()) {
+            let log_factor = (STEP * side.len() as f64).copysign(end);
+            side.push(candidate(log_factor, &last.parameters.rotations)?);
         }
+        Ok(())
+    };
+    let at_matches = || candidate(0.0, &found.rotations).map(|one| vec![one]);
+    let (mut shorter, mut longer) = (at_matches()?, at_matches()?);
+    extend(&mut shorter, -STEP)?;
+    extend(&mut longer, STEP)?;
+    let is_told = problem.priors.iter().any(|prior| prior.focal_told);
+    let is_sure = [&shorter, &longer].iter().filter_map(|side| side.last()).all(|one| one.improbable > SURE);
+    let asks_lines = !is_told && !is_sure && lines.iter().filter(|lines| !lines.is_empty()).count() > 1;
+    let is_as_expected = expectation.off.abs() <= AS_EXPECTED * expectation.sd;
+    if !asks_lines && is_as_expected {
+        return Ok(None);
     }
-    Ok(best.map(|(_, best)| best).filter(|best| best.factor != 1.0))
+    let beyond = if asks_lines { BEYOND } else { STEP };
+    extend(&mut shorter, -expectation.off.max(0.0) - beyond)?;
+    extend(&mut longer, (-expectation.off).max(0.0) + beyond)?;
+    let candidates: Vec<Candidate> = shorter.into_iter().skip(1).rev().chain(longer).collect();
+
+    let by_lines = if asks_lines { told_by_lines(problem.priors, &candidates, lines) } else { None };
+    if by_lines.is_none() && is_as_expected {
+        return Ok(None);
+    }
+    let improbable = |one: &Candidate| {
+        let lines = by_lines.map_or(0.0, |told| told.improbable(one.log_factor));
+        one.improbable + expectation.improbable(one.log_factor) + lines
+    };
+    let probable: Vec<f64> = candidates.iter().map(|one| -improbable(one)).collect();
+    let Some(best) = peak(&probable) else { return Ok(None) };
+    let nearest = &candidates[best.round() as usize];
+    let log_factor = nearest.log_factor + STEP * (best - best.round());
+    let Candidate { parameters, .. } = candidate(log_factor, &nearest.parameters.rotations)?;
+    let opened = OpenFocal { factor: log_factor.exp(), by_lines: by_lines.is_some() };
+    Ok(Some(ExpectedFocal { parameters, opened }))
+}
+
+/// What lines tell through the cameras of `candidates`, ordered by their focal lengths.
+fn told_by_lines(priors: &[CameraPrior], candidates: &[Candidate], lines: &[Vec<LineSegment>]) -> Option<FocalByLines> {
+    let cameras: Vec<Vec<Camera>> = candidates.iter().map(|one| one.parameters.cameras(priors)).collect();
+    let frames: Vec<WorkingFrame> = priors.iter().map(|prior| prior.frame).collect();
+    FocalByLines::told(&cameras, candidates.first()?.log_factor, STEP, lines, &frames)
 }
 
 /// What is expected of focal lengths as a whole.
@@ -97,9 +163,9 @@ impl Expectation {
         Self { off: sum / count.max(1) as f64, sd: sds.fold(0.0, f64::max) }
     }
 
-    /// Minus twice the logarithm of its probability when the focal lengths are longer by a factor.
-    fn improbable(&self, factor: f64) -> f64 {
-        ((self.off + factor.ln()) / self.sd).powi(2)
+    /// Minus twice the logarithm of its probability when the focal lengths are longer by a factor of this logarithm.
+    fn improbable(&self, log_factor: f64) -> f64 {
+        ((self.off + log_factor) / self.sd).powi(2)
     }
 }
 

@@ -63,8 +63,12 @@ fn found(pairs: &[PairMatches], count: usize, focal_px: Option<f64>, scene: Scen
     let frame = WorkingFrame { width: WIDTH, height: HEIGHT, working_from_full: 1.0 };
     let priors = vec![CameraPrior { focal_px, ..CameraPrior::unknown(frame, 0) }; count];
     let options = CameraOptions { scene, ..CameraOptions::default() };
-    run(&CameraInput { priors: &priors, pairs, curves: &[], reference: 0 }, &options, &StageContext::default())
-        .expect("solvable")
+    run(
+        &CameraInput { priors: &priors, pairs, curves: &[], lines: &[], reference: 0 },
+        &options,
+        &StageContext::default(),
+    )
+    .expect("solvable")
 }
 
 /// Largest distance, in units of the true plane, of the found plane from a scaled, turned and moved copy of the true one, over

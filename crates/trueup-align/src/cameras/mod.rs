@@ -6,11 +6,12 @@
 //! bundle adjustment (`bundle`), from coarse to fine (`refinement`), photographs that differ with focal lengths of their own where a lens was zoomed (`zoom`).
 //! Terms of the lenses are added as long as the matches, and
 //! edges that are to be straight (`straightness`), are sure of them (`lenses`, `lens_evidence`): a pinhole stays one. Pairs that then contradict the others are set
-//! aside (`contradictions`). Focal lengths that parallax leaves open are those that are expected, in part (`expected_focal`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
+//! aside (`contradictions`). Focal lengths that parallax leaves open are those that are expected, in part (`expected_focal`), and those through which lines lie at right angles (`directions`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
 //! (`flat_scene`, by `plane_adjustment`), and lines say how it is turned (`upright_plane`).
 
 mod bundle;
 mod contradictions;
+mod directions;
 mod equations;
 mod expected_focal;
 mod flat_scene;
@@ -37,13 +38,14 @@ mod zoom;
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::diagnostics::{Diagnostic, Subject};
-use trueup_core::lines::EdgeCurve;
+use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::matches::PairMatches;
 use trueup_core::{Result, StageContext};
 
 use crate::stitch_graph::{GraphEdge, StitchGraph};
 use bundle::Parameters;
 use contradictions::contradicting_pairs;
+use expected_focal::OpenFocal;
 use flat_scene::FlatInput;
 use intrinsics::InitialIntrinsics;
 use observations::{MATCHES_PER_PAIR, MATCHES_PER_PAIR_FOR_LENSES, Observations};
@@ -65,6 +67,8 @@ pub struct CameraInput<'a> {
     pub pairs: &'a [PairMatches],
     /// Edges of each photograph that may be straight lines of the scene; none where they are not to tell of lenses.
     pub curves: &'a [&'a [EdgeCurve]],
+    /// Line segments of each photograph, in working pixels.
+    pub lines: &'a [Vec<LineSegment>],
     /// The photograph whose rotation is the identity in the end.
     pub reference: usize,
 }
@@ -137,14 +141,14 @@ impl Cameras {
 /// which all cameras can be refined together, at a fraction of the cost. Focal lengths are shared within a camera
 /// unless the data contradict it, which keeps short rows from drifting.
 pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageContext) -> Result<Cameras> {
-    let CameraInput { priors, pairs, curves, reference } = *input;
+    let CameraInput { priors, pairs, curves, lines, reference } = *input;
     let priors: &[CameraPrior] = &priors.iter().map(|prior| prior.told_by(options)).collect::<Vec<_>>();
     let curves = CurveObservations::new(priors.iter().map(|prior| prior.frame), curves);
     let everything: Vec<usize> = (0..priors.len()).collect();
     let anchor = graph_of(priors.len(), pairs.iter()).central_photograph(&everything);
     let solve_with = |active: &[usize]| {
         let used: Vec<&PairMatches> = active.iter().map(|&position| &pairs[position]).collect();
-        let seen = Seen { pairs: &used, curves: &curves };
+        let seen = Seen { pairs: &used, curves: &curves, lines };
         solve(priors, seen, anchor, options, context)
     };
     let residuals_of = |cameras: &[Camera]| -> Vec<f64> {
@@ -177,8 +181,9 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
             "Keep the camera's metadata in the files, or overlap the photographs more.",
         ));
     }
-    if let Some(factor) = solution.expected_factor {
-        context.report(focal_expected(factor, priors.iter().any(|prior| prior.focal_px.is_some())));
+    if let Some(found) = &solution.opened {
+        let is_recorded = priors.iter().any(|prior| prior.focal_px.is_some());
+        context.report(focal_expected(found, is_recorded));
     }
     if let Some(doubt_px) = solution.lens_doubt_px.filter(|doubt_px| *doubt_px > DOUBTFUL_LENS_PX) {
         context.report(lens_uncertain(pairs.len(), doubt_px));
@@ -209,15 +214,21 @@ fn lens_uncertain(overlaps: usize, doubt_px: f64) -> Diagnostic {
     )
 }
 
-/// Says that what is expected of focal lengths took part in them; `is_recorded`: by metadata.
-fn focal_expected(factor: f64, is_recorded: bool) -> Diagnostic {
+/// Says that lines, or what is expected of focal lengths, took part in them; `is_recorded`: by metadata.
+fn focal_expected(found: &OpenFocal, is_recorded: bool) -> Diagnostic {
+    let factor = found.factor;
     let (change, longer) = (100.0 * (factor - 1.0).abs(), if factor > 1.0 { "longer" } else { "shorter" });
-    let by = if is_recorded { "the photographs record" } else { "is usual" };
+    let by = match (found.by_lines, is_recorded) {
+        (true, true) => "the right angles of lines and what the photographs record",
+        (true, false) => "the right angles of lines",
+        (false, true) => "what the photographs record",
+        (false, false) => "what is usual",
+    };
     Diagnostic::note(
         "focal-expected",
         Subject::stage("cameras"),
         format!(
-            "things at several distances, seen from several places, leave the focal length open; with what {by} it is \
+            "things at several distances, seen from several places, leave the focal length open; with {by} it is \
              {change:.0} % {longer} than matches alone say"
         ),
         "Tell the field of view (--lens-fov), or take the photographs from one place.",
@@ -245,8 +256,8 @@ struct Solution {
     cameras: Vec<Camera>,
     /// As the matches alone have them.
     by_matches: Vec<Camera>,
-    /// See [`refinement::ByMatches`].
-    expected_factor: Option<f64>,
+    /// Where these leave focal lengths open.
+    opened: Option<OpenFocal>,
     per_picture_focal: bool,
     focal_failed: bool,
     /// See [`refinement::Refined`].
@@ -262,12 +273,14 @@ const DOUBTFUL_LENS_PX: f64 = 2.0;
 struct Seen<'a> {
     pairs: &'a [&'a PairMatches],
     curves: &'a CurveObservations,
+    /// Line segments of each photograph.
+    lines: &'a [Vec<LineSegment>],
 }
 
 /// The cameras by what was seen, relative to photograph `anchor`.
 fn solve(
     priors: &[CameraPrior],
-    Seen { pairs, curves }: Seen<'_>,
+    Seen { pairs, curves, lines }: Seen<'_>,
     anchor: usize,
     options: &CameraOptions,
     context: &StageContext,
@@ -280,12 +293,12 @@ fn solve(
     let rotations = rotations::average(&graph, pairs, &relative, anchor);
     let InitialIntrinsics { focal_px, lenses } = intrinsics;
     let start = Parameters { focal_px, rotations, lenses };
-    let input = RefinementInput { priors, observations: &observations, for_lenses: &for_lenses, curves, anchor };
+    let input = RefinementInput { priors, observations: &observations, for_lenses: &for_lenses, curves, lines, anchor };
     let refined = refinement::refine(input, &start, options, context)?;
     Ok(Solution {
         cameras: refined.parameters.cameras(priors),
         by_matches: refined.by_matches.as_ref().map_or(&refined.parameters, |found| &found.parameters).cameras(priors),
-        expected_factor: refined.by_matches.as_ref().map(|found| found.expected_factor),
+        opened: refined.by_matches.map(|found| found.opened),
         per_picture_focal: refined.per_picture_focal,
         focal_failed: refined.focal_failed,
         lens_doubt_px: refined.lens_doubt_px,

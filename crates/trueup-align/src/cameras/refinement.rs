@@ -1,9 +1,10 @@
 //! Bundle adjustment from coarse to fine, with the focal lengths that the options and the data ask for.
 
+use trueup_core::lines::LineSegment;
 use trueup_core::{Result, StageContext};
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
-use super::expected_focal::{self, ExpectedFocal};
+use super::expected_focal::{self, ExpectedFocal, OpenFocal};
 use super::intrinsics::IntrinsicsModel;
 use super::lenses::{FoundLenses, LensSearch, settings};
 use super::observations::Observations;
@@ -21,6 +22,8 @@ pub(super) struct RefinementInput<'a> {
     pub for_lenses: &'a Observations,
     /// What tells of lenses beside them.
     pub curves: &'a CurveObservations,
+    /// Line segments of each photograph.
+    pub lines: &'a [Vec<LineSegment>],
     /// The photograph whose rotation stays.
     pub anchor: usize,
 }
@@ -35,15 +38,14 @@ pub(super) struct Refined {
     /// How far lenses may move corners unnoticed, working pixels, one standard deviation; `None` where few overlaps had not to tell
     /// of them alone, or a lens was found or told.
     pub lens_doubt_px: Option<f64>,
-    /// The cameras as the matches alone have them, where what is expected of focal lengths took part.
+    /// The cameras as the matches alone have them, where what lines tell, or is expected, of focal lengths took part.
     pub by_matches: Option<ByMatches>,
 }
 
-/// Cameras without what is expected of focal lengths.
+/// Cameras without what lines tell and what is expected of focal lengths.
 pub(super) struct ByMatches {
     pub parameters: Parameters,
-    /// By which factor the focal lengths are longer with it.
-    pub expected_factor: f64,
+    pub opened: OpenFocal,
 }
 
 impl Refined {
@@ -123,15 +125,17 @@ pub(super) fn refine(
         let few = input.observations.pairs.len() < OVERLAPS_FOR_LENSES && !fine.has_lens();
         let lens_doubt_px = if few { search.doubt_px(&fine, &CameraPrior::lens_groups(priors)) } else { None };
         let expected = match fine.has_lens() {
-            false => expected_focal::expected(&problem, &fine, options, context)?,
+            // Of photographs that parallax gives focal lengths of their own, no common factor makes angles right.
+            false if per_picture_focal => expected_focal::expected(&problem, &fine, &[], options, context)?,
+            false => expected_focal::expected(&problem, &fine, input.lines, options, context)?,
             true => None,
         };
-        let Some(ExpectedFocal { parameters, factor }) = expected else {
+        let Some(ExpectedFocal { parameters, opened }) = expected else {
             let parameters = problem.sharpened(fine, &model, context)?;
             return Ok(Refined { lens_doubt_px, ..Refined::of(parameters, per_picture_focal) });
         };
         let parameters = problem.sharpened(parameters, &IntrinsicsModel::fixed(priors.len()), context)?;
-        let by_matches = Some(ByMatches { parameters: fine, expected_factor: factor });
+        let by_matches = Some(ByMatches { parameters: fine, opened });
         return Ok(Refined { lens_doubt_px, by_matches, ..Refined::of(parameters, per_picture_focal) });
     }
     let parameters = with_expected_focal(&problem, start, context)?;

@@ -85,7 +85,7 @@ fn estimate(pairs: &[PairMatches], known_focal: Option<f64>, groups: &[usize]) -
 }
 
 fn solved(priors: &[CameraPrior], pairs: &[PairMatches], reference: usize) -> Cameras {
-    let input = CameraInput { priors, pairs, curves: &[], reference };
+    let input = CameraInput { priors, pairs, curves: &[], lines: &[], reference };
     let cameras = run(&input, &CameraOptions::default(), &StageContext::default()).expect("solvable");
     assert_eq!((cameras.cameras.len(), cameras.pair_rms_px.len()), (priors.len(), pairs.len()));
     cameras

@@ -5,7 +5,7 @@ use trueup_core::lens::PlacedLens;
 use super::*;
 
 fn solved_by(priors: &[CameraPrior], pairs: &[PairMatches], options: &CameraOptions) -> Vec<Camera> {
-    run(&CameraInput { priors, pairs, curves: &[], reference: 0 }, options, &StageContext::default())
+    run(&CameraInput { priors, pairs, curves: &[], lines: &[], reference: 0 }, options, &StageContext::default())
         .expect("solvable")
         .cameras
 }

@@ -10,8 +10,8 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
 use trueup_core::matches::PairMatches;
 
-use super::joint::{AxisWeights, LineVote, scales};
 use super::turn_equations::{RelativeCertainty, TurnEquations};
+use crate::vanishing::joint::{AxisWeights, LineVote, scales};
 
 /// Where there is parallax, a relative rotation absorbs most of it: the mean of the reciprocal depths of an overlap,
 /// which acts like a rotation about the photograph's axes, is several times their spread, which is what remains to be

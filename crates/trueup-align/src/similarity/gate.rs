@@ -1,7 +1,7 @@
 //! Whether the scene's dominant directions are believed.
 
-use super::frame_search::GUIDING_SIGNIFICANCE;
 use super::options::{GateMode, SimilarityOptions};
+use crate::vanishing::frame_search::GUIDING_SIGNIFICANCE;
 
 /// What the gate judges.
 #[derive(Debug, Clone, Copy)]

@@ -4,12 +4,12 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_z;
 
 use super::SimilarityOptions;
-use super::frame_search::GUIDING_SIGNIFICANCE;
-use super::jackknife::{self, covariance_by_photographs};
-use super::joint::{LineVote, Refinement};
 use super::synthetic::{Sweep, SyntheticScene, World};
 use super::tests::{missing, with_lines};
 use crate::vanishing::InterpretationPlanes;
+use crate::vanishing::frame_search::GUIDING_SIGNIFICANCE;
+use crate::vanishing::jackknife::{self, covariance_by_photographs};
+use crate::vanishing::joint::{LineVote, Refinement};
 
 fn max(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)

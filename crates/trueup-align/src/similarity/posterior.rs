@@ -25,11 +25,13 @@ use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 
 use super::camera_correction::{corrected_rotations, relative_certainties, turn_covariances};
-use super::jackknife::{AxisScatter, MIN_SECTORS, SCENE_DEVIATION_DEG, without_each_sector, without_some_photographs};
-use super::joint::{AxisWeights, LineVote, Refinement};
 use super::prior::{SimilarityPrior, VerticalSpread};
 use super::vertical::roll_of;
 use super::vpg::axis_weights;
+use crate::vanishing::jackknife::{
+    AxisScatter, MIN_SECTORS, SCENE_DEVIATION_DEG, without_each_sector, without_some_photographs,
+};
+use crate::vanishing::joint::{AxisWeights, LineVote, Refinement};
 use crate::vanishing::{InterpretationPlanes, VERTICAL_LINE_DEG};
 
 /// Fewer photographs tell nothing of how they scatter: of two, Student's t is 12.7.

@@ -1,12 +1,10 @@
 //! A vertical from the segments of all photographs alone, where the horizontal directions do not agree.
 
-use nalgebra::{Matrix3, Vector3};
-use trueup_core::geometry::orthonormal_complement;
+use nalgebra::Vector3;
 
-use super::joint::{LineVote, Support};
+use crate::vanishing::frame_search::{SEARCH_DEG, cone};
+use crate::vanishing::joint::{LineVote, Support};
 
-/// How far from the cameras' own vertical the segments' is sought, degrees.
-pub(super) const SEARCH_DEG: f64 = 25.0;
 /// Largest angle between a segment and the vertical for the segment to support it, degrees.
 const TOLERANCE_DEG: f64 = 2.0;
 /// Largest score of a rival direction, relative to the vertical's, that leaves no doubt about it.
@@ -69,22 +67,4 @@ pub(super) fn vertical_peak(vote: &LineVote, expected: &Vector3<f64>) -> Option<
     let outside = scored.iter().filter(|(_, direction)| direction.dot(&down) < radius);
     let rival = outside.map(|(score, _)| *score).fold(0.0, f64::max);
     (support.score > 0.0).then(|| VerticalPeak { down, support, rivalry: rival / support.score })
-}
-
-/// Directions within `radius` of `axis`, on rings `step` apart (radians).
-pub(super) fn cone(axis: &Vector3<f64>, radius: f64, step: f64) -> Vec<Vector3<f64>> {
-    let (first, second) = orthonormal_complement(axis);
-    let frame = Matrix3::from_columns(&[first, second, *axis]);
-    let mut directions = vec![*axis];
-    let rings = (radius / step).floor() as usize;
-    for ring in 1..=rings {
-        let polar = ring as f64 * step;
-        let count = (std::f64::consts::TAU * polar.sin() / step).ceil().max(1.0) as usize;
-        for place in 0..count {
-            let azimuth = std::f64::consts::TAU * place as f64 / count as f64;
-            let (sine, cosine) = azimuth.sin_cos();
-            directions.push(frame * Vector3::new(polar.sin() * cosine, polar.sin() * sine, polar.cos()));
-        }
-    }
-    directions
 }

@@ -7,12 +7,9 @@ use trueup_core::{Result, StageContext};
 
 use super::camera_correction::{corrected_rotations, relative_certainties};
 use super::dominant::{Dominant, dominant_frame};
-use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrames, search_frames};
 use super::gate::{GateEvidence, allowed_divergence, allowed_of_level_lines, divergence, failed_clause};
 use super::held::held_roll;
 use super::input::PriorInput;
-use super::jackknife::{covariance_by_photographs, covariance_by_sectors, deviation};
-use super::joint::{self, AxisWeights, LineVote, Refinement};
 use super::level::CameraLevel;
 use super::options::{GateMode, SimilarityOptions};
 use super::prior::{Guidance, VerticalSpread};
@@ -20,8 +17,11 @@ use super::signed_permutation::{match_triad, triad_residual};
 use super::turns::{RollEvidence, solve_turns};
 use super::upright::Upright;
 use super::vertical::{roll_of, vertical_by_reference, vertical_near, vertical_of};
-use super::vertical_vote::{SEARCH_DEG, vertical_peak};
+use super::vertical_vote::vertical_peak;
 use super::witnesses::{MIN_UPRIGHT_PHOTOGRAPHS, Reconciled, covariance_of_slopes, reconciled};
+use crate::vanishing::frame_search::{GUIDING_SIGNIFICANCE, PooledFrames, SEARCH_DEG, search_frames};
+use crate::vanishing::jackknife::{covariance_by_photographs, covariance_by_sectors, deviation};
+use crate::vanishing::joint::{self, AxisWeights, LineVote, Refinement};
 use crate::vanishing::{InterpretationPlanes, RefinedTriad};
 
 /// Fewest photographs whose level lines may be found to lie along a slope: of two, nothing but the few sectors they show tells how upright and level

@@ -8,8 +8,10 @@
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use trueup_core::geometry::orthonormal_complement;
 
-use super::jackknife::{AxisScatter, MIN_SECTORS, SCENE_DEVIATION_DEG, without_each_sector, without_some_photographs};
-use super::joint::{AxisWeights, LineVote, Refinement, TOLERANCE_DEG};
+use crate::vanishing::jackknife::{
+    AxisScatter, MIN_SECTORS, SCENE_DEVIATION_DEG, without_each_sector, without_some_photographs,
+};
+use crate::vanishing::joint::{AxisWeights, LineVote, Refinement, TOLERANCE_DEG};
 
 /// Standard deviation, about either axis, of the vertical that truly level lines imply from the true one, degrees. Reasoned: what is
 /// built level is so to a few millimeters in a meter.

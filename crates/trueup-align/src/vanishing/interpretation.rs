@@ -75,6 +75,21 @@ impl InterpretationPlanes {
         (0..cameras.len()).into_par_iter().map(of_one).collect()
     }
 
+    /// The longest `count` of them.
+    pub(crate) fn longest(mut self, count: usize) -> Self {
+        self.normals.truncate(count);
+        self.moments.truncate(count);
+        self.midpoints.truncate(count);
+        if let Some(rays) = &mut self.middle_rays {
+            rays.truncate(count);
+        }
+        self.lengths.truncate(count);
+        self.weights.truncate(count);
+        self.indices.truncate(count);
+        self.total_weight = self.weights.iter().sum();
+        self
+    }
+
     fn with_capacity(count: usize, camera: &Camera) -> Self {
         Self {
             normals: Vec::with_capacity(count),

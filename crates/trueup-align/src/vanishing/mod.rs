@@ -9,7 +9,10 @@
 //! adjustment is used, which makes the three directions orthogonal by construction. A focal length wrong by 10 % moves the
 //! roll by about 0.1 degree.
 
+pub(crate) mod frame_search;
 mod interpretation;
+pub(crate) mod jackknife;
+pub(crate) mod joint;
 mod options;
 mod refine;
 mod search;

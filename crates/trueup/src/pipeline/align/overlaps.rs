@@ -78,8 +78,8 @@ fn camera_options(options: &AlignOptions) -> Result<CameraOptions> {
 fn find(component: &Component, options: &OverlapOptions, context: &StageContext) -> Result<Overlaps> {
     let priors = component.camera_priors();
     let cameras = context.in_one_step("cameras", || {
-        let (pairs, curves) = (&component.pairs, &component.curves);
-        let input = cameras::CameraInput { priors: &priors, pairs, curves, reference: component.reference };
+        let (pairs, curves, lines) = (&component.pairs, &component.curves, &component.lines);
+        let input = cameras::CameraInput { priors: &priors, pairs, curves, lines, reference: component.reference };
         cameras::run(&input, options.cameras, context)
     })?;
     let pairs: Vec<PairMatches> = (0..component.pairs.len())

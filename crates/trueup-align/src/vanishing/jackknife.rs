@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::joint::{LineVote, Refinement};
+use crate::vanishing::joint::{LineVote, Refinement};
 
 /// Most groups that photographs are left out in to learn how sure the refinement is.
 const MAX_GROUPS: usize = 8;
@@ -18,11 +18,11 @@ const SHAPELESS_GROUPS: f64 = 2.0;
 /// Standard deviation, about any level axis, of what all lines of a scene err by alike, degrees. Fitted on 100 photographs of rendered rooms, whose level
 /// is exact (which need none), and 267 cut from panoramas: the smallest hundredth with which the 95 % interval holds the truth of 95 % of either.
 /// docs/quality.md has the coverage on others.
-pub(super) const SCENE_DEVIATION_DEG: f64 = 0.02;
+pub(crate) const SCENE_DEVIATION_DEG: f64 = 0.02;
 /// Width of a sector of the scene, degrees of longitude: a facade, seen from where its lines can be told apart.
 const SECTOR_DEG: f64 = 20.0;
 /// Fewer sectors with lines tell nothing of how they scatter.
-pub(super) const MIN_SECTORS: usize = 4;
+pub(crate) const MIN_SECTORS: usize = 4;
 
 /// The sector of longitude about the vertical, column `vertical` of a frame, that a direction of the common frame lies in: a number from 0.
 fn sector(frame: &Matrix3<f64>, vertical: usize, toward: &Vector3<f64>) -> usize {
@@ -34,7 +34,7 @@ fn sector(frame: &Matrix3<f64>, vertical: usize, toward: &Vector3<f64>) -> usize
 
 /// How far an axis of a frame depends on what is asked of the scene, by frames found without one group of it each.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct AxisScatter {
+pub(crate) struct AxisScatter {
     /// Covariance of the axis, rad^2; too small of few groups, as Student's t knows.
     pub covariance: Matrix3<f64>,
     /// How many groups it comes from: two or more.
@@ -43,7 +43,7 @@ pub(super) struct AxisScatter {
 
 impl AxisScatter {
     /// Of column `axis` of frames found without one group each; `None` of fewer than two.
-    pub(super) fn of(frames: &[Matrix3<f64>], axis: usize) -> Option<Self> {
+    pub(crate) fn of(frames: &[Matrix3<f64>], axis: usize) -> Option<Self> {
         if frames.len() < 2 {
             return None;
         }
@@ -55,29 +55,28 @@ impl AxisScatter {
     }
 
     /// Degrees of freedom that the covariance is estimated with.
-    pub(super) fn degrees_of_freedom(&self) -> usize {
+    pub(crate) fn degrees_of_freedom(&self) -> usize {
         self.groups - 1
     }
 
     /// The covariance to weigh `axis` by: it grows as Student's t does, and the fewer groups tell it, the less it is believed that the axis is
     /// surer one way than the other.
-    pub(super) fn widened(&self, axis: &Vector3<f64>) -> Matrix3<f64> {
+    pub(crate) fn widened(&self, axis: &Vector3<f64>) -> Matrix3<f64> {
         let free = self.degrees_of_freedom() as f64;
-        let few = 1.0 + FEW_GROUPS / free;
         let about = (Matrix3::identity() - axis * axis.transpose()) * (0.5 * self.covariance.trace());
-        (self.covariance * free + about * SHAPELESS_GROUPS) / (free + SHAPELESS_GROUPS) * few.powi(2)
+        (self.covariance * free + about * SHAPELESS_GROUPS) / (free + SHAPELESS_GROUPS) * few(free).powi(2)
     }
 }
 
 /// Standard deviation in radians of an axis of this covariance, about both of its tangents together.
-pub(super) fn deviation(covariance: &Matrix3<f64>) -> f64 {
+pub(crate) fn deviation(covariance: &Matrix3<f64>) -> f64 {
     covariance.trace().sqrt()
 }
 
 /// Covariance of the vertical, column `vertical` of a frame that a refinement found, rad^2, by what is left without one sector of the
 /// scene each; `None` with fewer than [`MIN_SECTORS`]. One thing that several photographs show is in the lines of all of them: leaving out
 /// photographs does not show that all rests on it.
-pub(super) fn covariance_by_sectors(
+pub(crate) fn covariance_by_sectors(
     vote: &LineVote,
     refinement: Refinement<'_>,
     vertical: usize,
@@ -91,7 +90,7 @@ pub(super) fn covariance_by_sectors(
 /// again: how much it depends on which photographs are asked. Infinite on the diagonal of a single photograph, of which nothing is known.
 ///
 /// Photographs, not segments, are left out, because the segments of one photograph err together.
-pub(super) fn covariance_by_photographs(vote: &LineVote, refinement: Refinement<'_>, axis: usize) -> Matrix3<f64> {
+pub(crate) fn covariance_by_photographs(vote: &LineVote, refinement: Refinement<'_>, axis: usize) -> Matrix3<f64> {
     let scatter = AxisScatter::of(&without_some_photographs(vote, refinement), axis);
     let widened = |scatter: AxisScatter| scatter.widened(&refinement.start.column(axis).into_owned());
     scatter.map_or_else(|| Matrix3::from_diagonal_element(f64::INFINITY), widened)
@@ -99,10 +98,28 @@ pub(super) fn covariance_by_photographs(vote: &LineVote, refinement: Refinement<
 
 /// The frames that come out of a refined one when the segments of one group of photographs at a time are not asked: at most [`MAX_GROUPS`]
 /// groups, of equal numbers of photographs as far as these can be divided.
-pub(super) fn without_some_photographs(vote: &LineVote, refinement: Refinement<'_>) -> Vec<Matrix3<f64>> {
+pub(crate) fn without_some_photographs(vote: &LineVote, refinement: Refinement<'_>) -> Vec<Matrix3<f64>> {
     let groups = vote.photographs().min(MAX_GROUPS);
     let without = |group: usize| vote.refine_again(refinement, |one| one.photograph % groups != group);
     (0..groups).into_par_iter().map(without).collect()
+}
+
+/// The sector of longitude about the vertical, column `vertical` of `frame`, that the midpoint of every segment lies in, a number from 0; by photograph.
+pub(crate) fn sectors(vote: &LineVote, frame: &Matrix3<f64>, vertical: usize) -> Vec<Vec<usize>> {
+    vote.by_midpoint(|toward| sector(frame, vertical, &toward))
+}
+
+/// Standard deviation of a number that was found without one group each, two or more; it grows as Student's t does of few.
+pub(crate) fn deviation_of(without_each: &[f64]) -> f64 {
+    let groups = without_each.len() as f64;
+    let mean = without_each.iter().sum::<f64>() / groups;
+    let squares: f64 = without_each.iter().map(|one| (one - mean).powi(2)).sum();
+    (squares * (groups - 1.0) / groups).sqrt() * few(groups - 1.0)
+}
+
+/// By which factor a deviation with so many degrees of freedom is too small.
+fn few(degrees_of_freedom: f64) -> f64 {
+    1.0 + FEW_GROUPS / degrees_of_freedom
 }
 
 /// The frames that come out of a refined one, whose column `vertical` is the vertical, when the segments of one sector of the scene at a time are not
@@ -110,9 +127,9 @@ pub(super) fn without_some_photographs(vote: &LineVote, refinement: Refinement<'
 ///
 /// The pieces of a line, its views in several photographs, and the window frames of a facade lie in one sector. What
 /// they err by alike, leaving out photographs would not show: another photograph still has it.
-pub(super) fn without_each_sector(vote: &LineVote, refinement: Refinement<'_>, vertical: usize) -> Vec<Matrix3<f64>> {
+pub(crate) fn without_each_sector(vote: &LineVote, refinement: Refinement<'_>, vertical: usize) -> Vec<Matrix3<f64>> {
     let Refinement { start: frame, axes_used, .. } = refinement;
-    let sector_of = vote.by_midpoint(|toward| sector(frame, vertical, &toward));
+    let sector_of = sectors(vote, frame, vertical);
     let supporters = vote.supporters(frame, axes_used);
     let mut populated: Vec<usize> = supporters.iter().map(|one| sector_of[one.photograph][one.line]).collect();
     populated.sort_unstable();

@@ -12,7 +12,9 @@ use rayon::prelude::*;
 use trueup_core::geometry::orthonormal_complement;
 
 use super::joint::LineVote;
-use super::vertical_vote::{SEARCH_DEG, cone};
+
+/// How far from the cameras' own vertical the segments' is sought, degrees.
+pub(crate) const SEARCH_DEG: f64 = 25.0;
 
 /// Turns about a vertical that are scored: steps of 1.5 degrees over the quarter turn after which a frame repeats.
 const TURNS: usize = 60;
@@ -27,7 +29,7 @@ const TOLERANCE_DEG: f64 = 1.5;
 const STEP_DEG: f64 = 2.0;
 /// How far a frame must stand out to guide where the photographs do not agree, standard deviations. Measured: chosen on
 /// the 130 sets of the gate's experiment and on real sets.
-pub(super) const GUIDING_SIGNIFICANCE: f64 = 7.0;
+pub(crate) const GUIDING_SIGNIFICANCE: f64 = 7.0;
 
 /// Verticals whose best frames are refined: within the search's step and tolerance, few segments fit as well elsewhere as at the best. Measured: on cut
 /// sets of a room with one blank wall the first alone ended beside the best one once in nine, the first four never.
@@ -35,7 +37,7 @@ const REFINED: usize = 8;
 
 /// The best frames, and how far the first stands out.
 #[derive(Debug, Clone)]
-pub(super) struct PooledFrames {
+pub(crate) struct PooledFrames {
     /// The best frame of each of the best verticals tried, the best first. Columns are the directions in the common frame, the vertical
     /// first; rotations.
     starts: Vec<Matrix3<f64>>,
@@ -46,7 +48,7 @@ pub(super) struct PooledFrames {
 impl PooledFrames {
     /// The frame that fits best of those that all segments refine, those of all three directions alike: what made a frame stand out is what
     /// it is known by. `None` without any.
-    pub(super) fn refined(&self, vote: &LineVote) -> Option<Matrix3<f64>> {
+    pub(crate) fn refined(&self, vote: &LineVote) -> Option<Matrix3<f64>> {
         let refine = |start: &Matrix3<f64>| {
             let frame = vote.refine_frame(start, &[1.0; 3]);
             (frame, vote.fit(&frame))
@@ -70,7 +72,7 @@ struct Ring {
 ///
 /// The score of a frame is the sum over segments of weight times (1 - (sine / sine of the tolerance)^2) for the frame's
 /// direction that fits best. `None` with fewer than [`MIN_SEGMENTS`] segments.
-pub(super) fn search_frames(vote: &LineVote, expected: &Vector3<f64>) -> Option<PooledFrames> {
+pub(crate) fn search_frames(vote: &LineVote, expected: &Vector3<f64>) -> Option<PooledFrames> {
     let segments = vote.longest(MAX_SEGMENTS);
     if segments.len() < MIN_SEGMENTS {
         return None;
@@ -133,4 +135,22 @@ fn ring(vertical: &Vector3<f64>, segments: &[(Vector3<f64>, f64)], tolerance: f6
         }
     }
     ring
+}
+
+/// Directions within `radius` of `axis`, on rings `step` apart (radians).
+pub(crate) fn cone(axis: &Vector3<f64>, radius: f64, step: f64) -> Vec<Vector3<f64>> {
+    let (first, second) = orthonormal_complement(axis);
+    let frame = Matrix3::from_columns(&[first, second, *axis]);
+    let mut directions = vec![*axis];
+    let rings = (radius / step).floor() as usize;
+    for ring in 1..=rings {
+        let polar = ring as f64 * step;
+        let count = (std::f64::consts::TAU * polar.sin() / step).ceil().max(1.0) as usize;
+        for place in 0..count {
+            let azimuth = std::f64::consts::TAU * place as f64 / count as f64;
+            let (sine, cosine) = azimuth.sin_cos();
+            directions.push(frame * Vector3::new(polar.sin() * cosine, polar.sin() * sine, polar.cos()));
+        }
+    }
+    directions
 }

@@ -11,14 +11,14 @@
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use trueup_core::geometry::{exp_rotation, nearest_rotation, orthonormal_complement};
 
-use crate::vanishing::InterpretationPlanes;
+use super::interpretation::InterpretationPlanes;
 
 /// Scale of the robust loss at which the refinement starts, working pixels.
 const START_SCALE_PX: f64 = 4.0;
 /// Scale of the robust loss at which the refinement ends, working pixels.
 const END_SCALE_PX: f64 = 0.5;
 /// Largest angle between a segment and a direction for the segment to vote, degrees.
-pub(super) const TOLERANCE_DEG: f64 = 3.0;
+pub(crate) const TOLERANCE_DEG: f64 = 3.0;
 /// Iterations at each scale of the loss.
 const ITERATIONS_PER_SCALE: usize = 4;
 /// Factor between successive scales.
@@ -29,18 +29,18 @@ const DAMPING: f64 = 1e-6;
 const REPEATS: usize = 3;
 
 /// Factors on the weights of the segments of each axis (column) of a frame.
-pub(super) type AxisWeights = [f64; 3];
+pub(crate) type AxisWeights = [f64; 3];
 
 /// A segment: its photograph and its place among the usable ones there.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SegmentPlace {
+pub(crate) struct SegmentPlace {
     pub photograph: usize,
     pub line: usize,
 }
 
 /// A refinement of a frame over its turns.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Refinement<'a> {
+pub(crate) struct Refinement<'a> {
     pub start: &'a Matrix3<f64>,
     /// Axes that segments may support: the first so many columns.
     pub axes_used: usize,
@@ -72,7 +72,7 @@ struct NearestAxis {
 
 /// The usable segments of all photographs with their cameras.
 #[derive(Debug)]
-pub(super) struct LineVote {
+pub(crate) struct LineVote {
     photographs: Vec<PhotographLines>,
 }
 
@@ -84,7 +84,7 @@ struct PhotographLines {
 
 /// The support of one direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Support {
+pub(crate) struct Support {
     /// Sum over segments of weight times (1 - (angle / tolerance)^2), negative terms left out.
     pub score: f64,
     /// Number of segments within the tolerance.
@@ -95,18 +95,18 @@ pub(super) struct Support {
 
 impl LineVote {
     /// `rotations` and `planes` per photograph.
-    pub(super) fn new(rotations: &[Matrix3<f64>], planes: Vec<InterpretationPlanes>) -> Self {
+    pub(crate) fn new(rotations: &[Matrix3<f64>], planes: Vec<InterpretationPlanes>) -> Self {
         let photographs = rotations.iter().zip(planes).map(|(&rotation, planes)| PhotographLines { rotation, planes });
         Self { photographs: photographs.collect() }
     }
 
     /// The usable segments of photograph `index`.
-    pub(super) fn planes(&self, index: usize) -> &InterpretationPlanes {
+    pub(crate) fn planes(&self, index: usize) -> &InterpretationPlanes {
         &self.photographs[index].planes
     }
 
     /// Normals in the common frame and weights of about `most` segments, the longest of every photograph.
-    pub(super) fn longest(&self, most: usize) -> Vec<(Vector3<f64>, f64)> {
+    pub(crate) fn longest(&self, most: usize) -> Vec<(Vector3<f64>, f64)> {
         let of_each = most.div_ceil(self.photographs.len().max(1));
         let of_photograph = |photograph: &PhotographLines| -> Vec<(Vector3<f64>, f64)> {
             let normals = photograph.planes.normals.iter().take(of_each);
@@ -119,34 +119,40 @@ impl LineVote {
     }
 
     /// The sum of the segments' weights.
-    pub(super) fn total_weight(&self) -> f64 {
+    pub(crate) fn total_weight(&self) -> f64 {
         self.photographs.iter().map(|photograph| photograph.planes.total_weight).sum()
     }
 
     /// Number of photographs that show a direction: by three segments or more that may vote for it.
-    pub(super) fn photographs_along(&self, direction: &Vector3<f64>) -> usize {
+    pub(crate) fn photographs_along(&self, direction: &Vector3<f64>) -> usize {
         self.support(direction, TOLERANCE_DEG.to_radians()).photographs
     }
 
     /// Refines a frame (columns are directions in the common frame) over SO(3); `axis_weights` multiply the weights of
     /// the segments of each axis.
-    pub(super) fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
+    pub(crate) fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
         self.refine(Refinement { start, axes_used: 3, axis_weights }, scales(), |_| true)
     }
 
-    /// How well segments fit a frame: the sum of their weights, each times 1 / (1 + (r / s)^2) of its residual r, with s the last scale of the loss, whose
-    /// complement that is.
-    pub(super) fn fit(&self, frame: &Matrix3<f64>) -> f64 {
-        let mut sum = 0.0;
-        self.for_each_supporter(
-            frame,
-            3,
-            END_SCALE_PX,
-            |_| true,
-            // The robust weight is the square of that.
-            |one| sum += one.weight * (1.0 + (one.residual_px / END_SCALE_PX).powi(2)),
-        );
-        sum
+    /// How well segments fit a frame: the sum of their [`Self::fits`].
+    pub(crate) fn fit(&self, frame: &Matrix3<f64>) -> f64 {
+        self.photographs.iter().flat_map(|photograph| photograph.fits(frame)).sum()
+    }
+
+    /// How well each segment fits a frame, by photograph: its weight times 1 / (1 + (r / s)^2) of its residual r, with s the last scale of the loss, whose
+    /// complement that is; 0 of those that support no axis.
+    pub(crate) fn fits(&self, frame: &Matrix3<f64>) -> Vec<Vec<f64>> {
+        self.photographs.iter().map(|photograph| photograph.fits(frame).collect()).collect()
+    }
+
+    /// The same where each photograph's own segments turn the frame for it.
+    pub(crate) fn fits_of_each(&self, frame: &Matrix3<f64>) -> Vec<Vec<f64>> {
+        let refinement = Refinement { start: frame, axes_used: 3, axis_weights: &[1.0; 3] };
+        let of_photograph = |(index, photograph): (usize, &PhotographLines)| {
+            let own = self.refine(refinement, scales(), |one| one.photograph == index);
+            photograph.fits(&own).collect()
+        };
+        self.photographs.iter().enumerate().map(of_photograph).collect()
     }
 
     fn mean_weight(&self) -> f64 {
@@ -155,7 +161,7 @@ impl LineVote {
     }
 
     /// Refines a frame that all segments have refined, by those `asked` alone: at the last scale of the loss.
-    pub(super) fn refine_again(
+    pub(crate) fn refine_again(
         &self,
         refinement: Refinement<'_>,
         asked: impl Fn(SegmentPlace) -> bool,
@@ -164,12 +170,12 @@ impl LineVote {
     }
 
     /// Number of photographs.
-    pub(super) fn photographs(&self) -> usize {
+    pub(crate) fn photographs(&self) -> usize {
         self.photographs.len()
     }
 
     /// `value` of the direction of every segment's midpoint in the common frame, not of unit length; by photograph.
-    pub(super) fn by_midpoint<T>(&self, value: impl Fn(Vector3<f64>) -> T) -> Vec<Vec<T>> {
+    pub(crate) fn by_midpoint<T>(&self, value: impl Fn(Vector3<f64>) -> T) -> Vec<Vec<T>> {
         let of_photograph = |photograph: &PhotographLines| {
             let toward =
                 |midpoint: &Vector2<f64>| photograph.rotation.tr_mul(&midpoint.push(photograph.planes.focal_px));
@@ -179,7 +185,7 @@ impl LineVote {
     }
 
     /// The segments that support one of the first `axes_used` axes of `frame`.
-    pub(super) fn supporters(&self, frame: &Matrix3<f64>, axes_used: usize) -> Vec<SegmentPlace> {
+    pub(crate) fn supporters(&self, frame: &Matrix3<f64>, axes_used: usize) -> Vec<SegmentPlace> {
         let mut found = Vec::new();
         for (index, photograph) in self.photographs.iter().enumerate() {
             let axes = photograph.rotation * frame;
@@ -220,14 +226,14 @@ impl LineVote {
     }
 
     /// The frame whose first column alone is refined: the direction that segments near it point to.
-    pub(super) fn refine_first_axis(&self, start: &Matrix3<f64>) -> Matrix3<f64> {
+    pub(crate) fn refine_first_axis(&self, start: &Matrix3<f64>) -> Matrix3<f64> {
         self.refine(Refinement { start, axes_used: 1, axis_weights: &[1.0; 3] }, scales(), |_| true)
     }
 
     /// Normal matrix and gradient, in px^2 per rad^2 and px^2 per rad, of the squared residuals of photograph `index`
     /// under a small turn in the common frame, for the camera `rotation` in place of the photograph's own. Segments
     /// weigh 1 on average, times the robust loss of `scale` pixels and their axis' weight.
-    pub(super) fn turn_equations(
+    pub(crate) fn turn_equations(
         &self,
         index: usize,
         rotation: &Matrix3<f64>,
@@ -255,7 +261,7 @@ impl LineVote {
     }
 
     /// Refines one direction of the common frame alone, over the sphere.
-    pub(super) fn refine_direction(&self, start: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn refine_direction(&self, start: &Vector3<f64>) -> Vector3<f64> {
         let mut direction = *start;
         for scale in scales() {
             for _ in 0..ITERATIONS_PER_SCALE {
@@ -298,7 +304,7 @@ impl LineVote {
     }
 
     /// How strongly the segments support `direction`.
-    pub(super) fn support(&self, direction: &Vector3<f64>, tolerance: f64) -> Support {
+    pub(crate) fn support(&self, direction: &Vector3<f64>, tolerance: f64) -> Support {
         let mut total = Support { score: 0.0, lines: 0, photographs: 0 };
         for photograph in &self.photographs {
             let (score, lines) = photograph.support(&(photograph.rotation * direction), tolerance);
@@ -323,6 +329,17 @@ impl PhotographLines {
             }
         }
         best
+    }
+
+    /// [`LineVote::fits`] of one photograph.
+    fn fits(&self, frame: &Matrix3<f64>) -> impl Iterator<Item = f64> {
+        let axes = self.rotation * frame;
+        (0..self.planes.len()).map(move |line| {
+            let nearest = self.nearest_axis(&axes, 3, line);
+            let supports = nearest.filter(|nearest| self.is_within_tolerance(nearest.residual_px, line));
+            let share = |one: NearestAxis| 1.0 / (1.0 + (one.residual_px / END_SCALE_PX).powi(2));
+            supports.map_or(0.0, |one| self.planes.weights[line] * share(one))
+        })
     }
 
     /// [`LineVote::for_each_supporter`] of one photograph, for a camera of this rotation.
@@ -375,7 +392,7 @@ impl PhotographLines {
 }
 
 /// The scales of the loss in pixels, from coarse to fine.
-pub(super) fn scales() -> impl Iterator<Item = f64> {
+pub(crate) fn scales() -> impl Iterator<Item = f64> {
     let last = END_SCALE_PX;
     let steps = (START_SCALE_PX / last).max(1.0).ln() / -SHRINK.ln();
     let steps = steps.ceil() as i32;
