@@ -33,7 +33,7 @@ const SCENE_DEVIATION: f64 = 0.06;
 /// Segments that are asked, shared out evenly among the photographs, the longest first.
 const MAX_SEGMENTS: usize = 600;
 /// Of so many focal lengths one has its frame searched from nothing.
-const SEARCHED_EVERY: usize = 4;
+const SEARCHED_EVERY: usize = 6;
 
 /// A focal length that lines tell.
 #[derive(Debug, Clone, Copy)]
@@ -78,7 +78,7 @@ fn rotations_of(cameras: &[Camera]) -> Vec<Matrix3<f64>> {
 /// The best frames through the cameras of each focal length in turn. It turns little from one to the next, so that few are searched from nothing.
 fn best_frames(votes: &[LineVote], cameras: &[Vec<Camera>]) -> Option<Vec<BestFrame>> {
     let search = |index: usize| BestFrame::searched(&votes[index], &rotations_of(&cameras[index]));
-    let is_searched = |index: usize| index % SEARCHED_EVERY == SEARCHED_EVERY / 2 || index + 1 == votes.len();
+    let is_searched = |index: usize| index % SEARCHED_EVERY == SEARCHED_EVERY / 2;
     let searched = (0..votes.len()).into_par_iter().map(|index| is_searched(index).then(|| search(index)));
     let mut best: Vec<Option<BestFrame>> =
         searched.map(|found| found.map_or(Some(None), |found| found.map(Some))).collect::<Option<_>>()?;
@@ -115,7 +115,7 @@ impl FocalByLines {
         let fits: Vec<Vec<f64>> = votes
             .par_iter()
             .zip(&found)
-            .map(|(vote, one)| vote.fits_of_each(&one.frame).into_iter().flatten().collect())
+            .map(|(vote, one)| vote.fits_of_own(&one.frame).into_iter().flatten().collect())
             .collect();
         let best = peak(&fits.iter().map(|fits| fits.iter().sum()).collect::<Vec<_>>())?;
         let nearest = best.round() as usize;

@@ -5,7 +5,7 @@
 //! scored on them. Where the scene has dominant directions, one frame stands out from all the others; where it has
 //! none, the best is a little better than the rest.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU as FULL_TURN};
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -18,6 +18,9 @@ pub(crate) const SEARCH_DEG: f64 = 25.0;
 
 /// Turns about a vertical that are scored: steps of 1.5 degrees over the quarter turn after which a frame repeats.
 const TURNS: usize = 60;
+
+/// Largest error of a turn that is only to tell which frames to score, radians.
+const TURN_ERROR: f64 = 2e-5;
 
 /// Segments that are scored, shared out evenly among the photographs, the longest first.
 const MAX_SEGMENTS: usize = 1200;
@@ -80,7 +83,8 @@ pub(crate) fn search_frames(vote: &LineVote, expected: &Vector3<f64>) -> Option<
     let tolerance = TOLERANCE_DEG.to_radians().sin();
     let step = STEP_DEG.to_radians();
     let verticals = cone(expected, SEARCH_DEG.to_radians(), step);
-    let rings: Vec<Ring> = verticals.par_iter().map(|vertical| ring(vertical, &segments, tolerance)).collect();
+    let turns: [(f64, f64); TURNS] = std::array::from_fn(|index| turn_of(index).sin_cos());
+    let rings: Vec<Ring> = verticals.par_iter().map(|vertical| ring(vertical, &turns, &segments, tolerance)).collect();
     let count = (rings.len() * TURNS) as f64;
     let mean = rings.iter().map(|ring| ring.sum).sum::<f64>() / count;
     let variance = rings.iter().map(|ring| ring.squares).sum::<f64>() / count - mean * mean;
@@ -102,10 +106,15 @@ fn turn_of(index: usize) -> f64 {
     (index as f64 + 0.5) * FRAC_PI_2 / TURNS as f64
 }
 
-/// Scores the frames of one vertical. Each segment reaches only the few turns that it fits.
-fn ring(vertical: &Vector3<f64>, segments: &[(Vector3<f64>, f64)], tolerance: f64) -> Ring {
+/// Scores the frames of one vertical; `turns` are the sines and cosines of theirs. Each segment reaches only the few turns that it fits.
+fn ring(
+    vertical: &Vector3<f64>,
+    turns: &[(f64, f64); TURNS],
+    segments: &[(Vector3<f64>, f64)],
+    tolerance: f64,
+) -> Ring {
     let (first, second) = orthonormal_complement(vertical);
-    let step = FRAC_PI_2 / TURNS as f64;
+    let places = TURNS as f64 / FRAC_PI_2;
     let mut scores = [0.0; TURNS];
     let mut common = 0.0;
     for (normal, weight) in segments {
@@ -113,17 +122,19 @@ fn ring(vertical: &Vector3<f64>, segments: &[(Vector3<f64>, f64)], tolerance: f6
         let upright = fit(normal.dot(vertical));
         common += weight * upright;
         let (along, across) = (normal.dot(&first), normal.dot(&second));
-        let reach = along.hypot(across);
-        // The horizontal directions orthogonal to the normal stand at this turn, and a quarter turn on.
-        let turn = (-along).atan2(across).rem_euclid(FRAC_PI_2);
-        let half = if reach > tolerance { (tolerance / reach).asin() } else { FRAC_PI_2 };
-        let from = ((turn - half) / step - 0.5).ceil() as i64;
-        let to = (((turn + half) / step - 0.5).floor() as i64).min(from + TURNS as i64 - 1);
-        for place in from..=to {
-            let level = fit(reach * ((place as f64 + 0.5) * step - turn).sin());
+        let (turn, half) =
+            (quarter_turn(along, across), reached(tolerance.powi(2) / (along * along + across * across)));
+        // Beyond a quarter turn the same ones come again: counted from a full one below, none is negative, and casts round downward.
+        let from = ((turn - half + FULL_TURN) * places + 0.5) as usize;
+        let to = ((turn + half + FULL_TURN) * places + 0.5) as usize;
+        let mut place = from % TURNS;
+        for _ in 0..(to - from).min(TURNS) {
+            let (sine, cosine) = turns[place];
+            let level = fit((along * cosine + across * sine).abs().min((across * cosine - along * sine).abs()));
             if level > upright {
-                scores[place.rem_euclid(TURNS as i64) as usize] += weight * (level - upright);
+                scores[place] += weight * (level - upright);
             }
+            place = if place + 1 == TURNS { 0 } else { place + 1 };
         }
     }
     let mut ring = Ring { sum: 0.0, squares: 0.0, best: f64::NEG_INFINITY, turn: 0 };
@@ -135,6 +146,24 @@ fn ring(vertical: &Vector3<f64>, segments: &[(Vector3<f64>, f64)], tolerance: f6
         }
     }
     ring
+}
+
+/// The turn, but for quarters, of the horizontal directions that are orthogonal to a normal, or nearest to that, by its parts along the horizontal axes;
+/// to within [`TURN_ERROR`]: an arc tangent by Hastings, "Approximations for Digital Computers" (1955), sheet 11.
+fn quarter_turn(along: f64, across: f64) -> f64 {
+    let tangent = if along.abs() > across.abs() { across / along } else { -along / across };
+    // Of a normal along the vertical any.
+    let tangent = if tangent.is_nan() { 0.0 } else { tangent };
+    let square = tangent * tangent;
+    tangent
+        * (0.999_866 + square * (-0.330_299_5 + square * (0.180_141 + square * (-0.085_133 + square * 0.020_835_1))))
+}
+
+/// A little more than the angle whose sine squared is `square`, or a quarter turn.
+fn reached(square: f64) -> f64 {
+    // (asin x - x) / x^3 grows up to x = 1.
+    let farther = |sine: f64| sine + (FRAC_PI_2 - 1.0) * sine.powi(3);
+    farther(square.min(1.0).sqrt()) + TURN_ERROR
 }
 
 /// Directions within `radius` of `axis`, on rings `step` apart (radians).
@@ -153,4 +182,25 @@ pub(crate) fn cone(axis: &Vector3<f64>, radius: f64, step: f64) -> Vec<Vector3<f
         }
     }
     directions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_segment_reaches_the_turns_that_it_fits() {
+        let quarter = |angle: f64| angle.rem_euclid(FRAC_PI_2);
+        for step in 0..720 {
+            let (along, across) = (f64::from(step) * 0.01).sin_cos();
+            let apart = quarter(quarter_turn(along, across) - (-along).atan2(across));
+            assert!(apart.min(FRAC_PI_2 - apart) < TURN_ERROR, "{step}: {apart}");
+        }
+        assert_eq!(quarter_turn(0.0, 0.0), 0.0);
+        for step in 0..=100 {
+            let angle = f64::from(step) / 100.0 * FRAC_PI_2;
+            assert!((angle..1.2 * angle + 0.05).contains(&reached(angle.sin().powi(2))), "{angle}");
+        }
+        assert!(reached(f64::INFINITY) >= FRAC_PI_2);
+    }
 }

@@ -134,19 +134,14 @@ impl LineVote {
         self.refine(Refinement { start, axes_used: 3, axis_weights }, scales(), |_| true)
     }
 
-    /// How well segments fit a frame: the sum of their [`Self::fits`].
+    /// How well segments fit a frame: the sum of their weights, each times 1 / (1 + (r / s)^2) of its residual r, with s the last scale of the loss, whose
+    /// complement that is; nothing of those that support no axis.
     pub(crate) fn fit(&self, frame: &Matrix3<f64>) -> f64 {
         self.photographs.iter().flat_map(|photograph| photograph.fits(frame)).sum()
     }
 
-    /// How well each segment fits a frame, by photograph: its weight times 1 / (1 + (r / s)^2) of its residual r, with s the last scale of the loss, whose
-    /// complement that is; 0 of those that support no axis.
-    pub(crate) fn fits(&self, frame: &Matrix3<f64>) -> Vec<Vec<f64>> {
-        self.photographs.iter().map(|photograph| photograph.fits(frame).collect()).collect()
-    }
-
-    /// The same where each photograph's own segments turn the frame for it.
-    pub(crate) fn fits_of_each(&self, frame: &Matrix3<f64>) -> Vec<Vec<f64>> {
+    /// The same of each segment, by photograph, where each photograph's own segments turn the frame for it.
+    pub(crate) fn fits_of_own(&self, frame: &Matrix3<f64>) -> Vec<Vec<f64>> {
         let refinement = Refinement { start: frame, axes_used: 3, axis_weights: &[1.0; 3] };
         let of_photograph = |(index, photograph): (usize, &PhotographLines)| {
             let own = self.refine(refinement, scales(), |one| one.photograph == index);
@@ -331,7 +326,7 @@ impl PhotographLines {
         best
     }
 
-    /// [`LineVote::fits`] of one photograph.
+    /// What [`LineVote::fit`] adds up of one photograph.
     fn fits(&self, frame: &Matrix3<f64>) -> impl Iterator<Item = f64> {
         let axes = self.rotation * frame;
         (0..self.planes.len()).map(move |line| {
