@@ -1,8 +1,11 @@
 //! Two photographs whose features are compared: what every search among their matches begins from.
 
+use trueup_core::source::WorkingFrame;
+
 use super::matched_points::MatchedPoints;
 use super::options::MatchingOptions;
 use super::putative::{PutativeMatch, putative_matches};
+use super::written::without_written;
 use crate::features::Features;
 
 /// Largest number of samples drawn for the global homography. More would find pairs of which fewer matches agree.
@@ -11,16 +14,19 @@ pub(super) const MAX_SAMPLES: usize = 6000;
 /// What looks alike in two photographs.
 pub(super) struct ComparedPair<'a> {
     features: [&'a Features; 2],
-    /// Most distinctive first.
+    /// Most distinctive first; none on writing.
     pub(super) putative: Vec<PutativeMatch>,
     /// Their places.
     pub(super) points: MatchedPoints,
 }
 
 impl<'a> ComparedPair<'a> {
-    /// Compares each of `a` with all of `b`.
-    pub(super) fn new(a: &'a Features, b: &'a Features, options: &MatchingOptions) -> Self {
-        let mut putative = putative_matches(a, b, options);
+    /// Compares each feature of the first with all of the second; with the frames that they are measured in.
+    pub(super) fn new(
+        [(a, frame_a), (b, frame_b)]: [(&'a Features, &WorkingFrame); 2],
+        options: &MatchingOptions,
+    ) -> Self {
+        let mut putative = without_written(putative_matches(a, b, options), a, [frame_a, frame_b]);
         putative.sort_by(|j, k| j.ratio.total_cmp(&k.ratio).then(j.point_a.cmp(&k.point_a)));
         let points = MatchedPoints {
             in_a: putative.iter().map(|candidate| candidate.at.in_a.into()).collect(),

@@ -63,7 +63,7 @@ pub fn consistent_matches(
 ) -> Result<Vec<PointMatch>> {
     options.check()?;
     context.check_cancelled()?;
-    let compared = ComparedPair::new(a.features, b.features, options);
+    let compared = ComparedPair::new([(a.features, a.frame), (b.features, b.frame)], options);
     let points = &compared.points;
     let mut generator = context.generator("consistent matches", compared.seed());
     let search = HomographySearch {

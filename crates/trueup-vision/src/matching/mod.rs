@@ -1,6 +1,6 @@
 //! Matches between pairs of photographs, and which pairs overlap.
 //!
-//! Descriptors are compared exhaustively (`putative`), a homography is sought that many matches agree on
+//! Descriptors are compared exhaustively (`putative`), what was written at the same place of both photographs is left out (`written`), a homography is sought that many matches agree on
 //! (`ransac`), the pair is judged by how many do (`pair`), and the matches of a joined pair are completed by further planes
 //! (`planes`). Where a lens bends so that no homography holds, or is told, turns
 //! are sought on rays (`turned`), and stand in for the homography. What surrounds a match places it more exactly than its features (`refined`). What the pairs show of each other tells which pictures are
@@ -25,6 +25,7 @@ mod strangers;
 #[cfg(test)]
 mod tests;
 mod turned;
+mod written;
 
 use std::collections::BTreeSet;
 

@@ -168,7 +168,7 @@ pub(super) fn match_pair(
     input.check()?;
     context.check_cancelled()?;
     let PairInput { a, b, forced } = *input;
-    let compared = ComparedPair::new(a.features, b.features, options);
+    let compared = ComparedPair::new([(a.features, a.frame), (b.features, b.frame)], options);
     let ComparedPair { putative, points, .. } = &compared;
     let mut pair = PairMatches {
         a: a.index,
