@@ -10,6 +10,8 @@
 //! No vanishing point is formed. The lines of all photographs are asked together, seen through the cameras that the matches have at each focal
 //! length, how well they fit one frame; how sure that is, the scene tells without one sector of it each.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use trueup_core::camera::Camera;
@@ -124,16 +126,7 @@ impl FocalByLines {
             return None;
         }
         let sectors: Vec<usize> = sectors(&votes[nearest], &found[nearest].frame, 0).into_iter().flatten().collect();
-        let mut populated: Vec<usize> =
-            sectors.iter().zip(&fits[nearest]).filter(|(_, fit)| **fit > 0.0).map(|(&sector, _)| sector).collect();
-        populated.sort_unstable();
-        populated.dedup();
-        let without = |left_out: usize| {
-            let kept = |(fit, &sector): (&f64, &usize)| if sector == left_out { 0.0 } else { *fit };
-            let sums = fits.iter().map(|fits| fits.iter().zip(&sectors).map(kept).sum::<f64>());
-            peak(&sums.collect::<Vec<f64>>())
-        };
-        let without_each: Vec<f64> = populated.iter().map(|&sector| without(sector)).collect::<Option<_>>()?;
+        let without_each = peaks_without_each(&fits, &sectors, nearest)?;
         if without_each.len() < FEWEST_SECTORS {
             return None;
         }
@@ -146,6 +139,19 @@ impl FocalByLines {
         let off = (log_factor - self.log_factor) / self.deviation;
         (self.free + 1.0) * (off * off / self.free).ln_1p()
     }
+}
+
+/// Where lines fit best without those of one sector each, of those in which some fit at `nearest`; `fits` are of each segment at each focal length. `None` if
+/// that is the first or the last focal length for any.
+fn peaks_without_each(fits: &[Vec<f64>], sectors: &[usize], nearest: usize) -> Option<Vec<f64>> {
+    let supporting = sectors.iter().zip(&fits[nearest]).filter(|(_, fit)| **fit > 0.0);
+    let populated: BTreeSet<usize> = supporting.map(|(&sector, _)| sector).collect();
+    let without = |left_out: usize| {
+        let kept = |(fit, &sector): (&f64, &usize)| if sector == left_out { 0.0 } else { *fit };
+        let sums = fits.iter().map(|fits| fits.iter().zip(sectors).map(kept).sum::<f64>());
+        peak(&sums.collect::<Vec<f64>>())
+    };
+    populated.into_iter().map(without).collect()
 }
 
 /// Where values at 0, 1, 2, ... are greatest, by the parabola through the greatest one and those beside it; `None` if it is the first or the last.

@@ -31,6 +31,8 @@ const MOST_OVERLAPS: usize = 30;
 const AS_EXPECTED: f64 = 0.5;
 /// Step of the search, as the logarithm of a factor. Reasoned: half of what lines scatter by at their surest.
 const STEP: f64 = 0.08;
+/// Most steps from what matches say to what is expected; they are longer where it is farther.
+const MOST_STEPS: f64 = 30.0;
 /// How far the search goes beyond what matches say and what is expected, in the same terms, where lines are asked.
 const BEYOND: f64 = 0.4;
 /// How improbable the focal lengths one step aside are by matches that are so sure of theirs, twice as sure as lines, that these are not asked.
@@ -71,73 +73,116 @@ pub(super) fn expected(
     options: &CameraOptions,
     context: &StageContext,
 ) -> Result<Option<ExpectedFocal>> {
-    let overlaps = problem.observations.pairs.len();
-    let matches: usize = problem.observations.pairs.iter().map(|pair| pair.matches.len()).sum();
     let expectation = Expectation::of(problem.priors, found, options);
-    // Both directions of every match.
-    let mean_square = |at: &Parameters| problem.matches_cost(at, FINE_HUBER_PX) / (2 * matches).max(1) as f64;
-    let by_matches = mean_square(found);
-    if by_matches.sqrt() <= FEATURE_ERROR_PX || overlaps > MOST_OVERLAPS {
-        return Ok(None);
-    }
-    // What features err by is independent; its share in the errors falls with their square.
-    let own = (FEATURE_ERROR_PX.powi(2) / by_matches).powi(2);
-    let independent = INDEPENDENT_PARTS * overlaps as f64 + own * matches as f64;
-    let fixed = IntrinsicsModel::fixed(problem.priors.len());
-    // Rotations that were found for one focal length are near those for the next.
-    let candidate = |log_factor: f64, rotations: &[Matrix3<f64>]| -> Result<Candidate> {
-        context.check_cancelled()?;
-        let focal_px = found.focal_px.iter().map(|focal_px| focal_px * log_factor.exp()).collect();
-        let start = Parameters { focal_px, rotations: rotations.to_vec(), lenses: found.lenses.clone() };
-        let parameters = problem.minimize(start, &fixed, FINE_HUBER_PX, context)?;
-        let improbable = independent * (mean_square(&parameters) / by_matches).ln();
-        Ok(Candidate { log_factor, parameters, improbable })
-    };
-    let extend = |side: &mut Vec<Candidate>, end: f64| -> Result<()> {
-        while let Some(last) = side.last().filter(|last| last.log_factor.abs() < end.abs()) {
-            let log_factor = (STEP * side.len() as f64).copysign(end);
-            side.push(candidate(log_factor, &last.parameters.rotations)?);
-        }
-        Ok(())
-    };
-    let at_matches = || candidate(0.0, &found.rotations).map(|one| vec![one]);
-    let (mut shorter, mut longer) = (at_matches()?, at_matches()?);
-    extend(&mut shorter, -STEP)?;
-    extend(&mut longer, STEP)?;
-    let is_told = problem.priors.iter().any(|prior| prior.focal_told);
+    let Some(search) = FocalSearch::new(problem, found, &expectation, context) else { return Ok(None) };
+    let step = search.step;
+    let (mut shorter, mut longer) = (search.toward(-step)?, search.toward(step)?);
     let is_sure = [&shorter, &longer].iter().filter_map(|side| side.last()).all(|one| one.improbable > SURE);
+    let is_told = problem.priors.iter().any(|prior| prior.focal_told);
     let asks_lines = !is_told && !is_sure && lines.iter().filter(|lines| !lines.is_empty()).count() > 1;
     let is_as_expected = expectation.off.abs() <= AS_EXPECTED * expectation.sd;
     if !asks_lines && is_as_expected {
         return Ok(None);
     }
-    let beyond = if asks_lines { BEYOND } else { STEP };
-    extend(&mut shorter, -expectation.off.max(0.0) - beyond)?;
-    extend(&mut longer, (-expectation.off).max(0.0) + beyond)?;
+    let beyond = if asks_lines { BEYOND } else { step };
+    search.extend(&mut shorter, -expectation.off.max(0.0) - beyond)?;
+    search.extend(&mut longer, (-expectation.off).max(0.0) + beyond)?;
     let candidates: Vec<Candidate> = shorter.into_iter().skip(1).rev().chain(longer).collect();
-
-    let by_lines = if asks_lines { told_by_lines(problem.priors, &candidates, lines) } else { None };
+    let by_lines = if asks_lines { told_by_lines(problem.priors, &candidates, step, lines) } else { None };
     if by_lines.is_none() && is_as_expected {
         return Ok(None);
     }
-    let improbable = |one: &Candidate| {
+    let probable = candidates.iter().map(|one| {
         let lines = by_lines.map_or(0.0, |told| told.improbable(one.log_factor));
-        one.improbable + expectation.improbable(one.log_factor) + lines
-    };
-    let probable: Vec<f64> = candidates.iter().map(|one| -improbable(one)).collect();
-    let Some(best) = peak(&probable) else { return Ok(None) };
+        -(one.improbable + expectation.improbable(one.log_factor) + lines)
+    });
+    let Some(best) = peak(&probable.collect::<Vec<f64>>()) else { return Ok(None) };
     let nearest = &candidates[best.round() as usize];
-    let log_factor = nearest.log_factor + STEP * (best - best.round());
-    let Candidate { parameters, .. } = candidate(log_factor, &nearest.parameters.rotations)?;
+    let log_factor = nearest.log_factor + step * (best - best.round());
+    let Candidate { parameters, .. } = search.candidate(log_factor, &nearest.parameters.rotations)?;
     let opened = OpenFocal { factor: log_factor.exp(), by_lines: by_lines.is_some() };
     Ok(Some(ExpectedFocal { parameters, opened }))
 }
 
+/// A search along focal lengths that are longer, or shorter, than those of the matches by one factor.
+struct FocalSearch<'a> {
+    problem: &'a BundleAdjustment<'a>,
+    found: &'a Parameters,
+    /// Mean square distance of matches by `found`, working pixels.
+    by_matches: f64,
+    /// How many of these distances are independent.
+    independent: f64,
+    /// The logarithm of the factor from one to the next.
+    step: f64,
+    context: &'a StageContext<'a>,
+}
+
+impl<'a> FocalSearch<'a> {
+    /// `None` where matches meet to the error of features, or there are more overlaps than leave anything open.
+    fn new(
+        problem: &'a BundleAdjustment<'a>,
+        found: &'a Parameters,
+        expectation: &Expectation,
+        context: &'a StageContext<'a>,
+    ) -> Option<Self> {
+        let step = STEP.max(expectation.off.abs() / MOST_STEPS);
+        let start = Self { problem, found, by_matches: 0.0, independent: 0.0, step, context };
+        let by_matches = start.mean_square(found);
+        let overlaps = problem.observations.pairs.len();
+        // What features err by is independent; its share in the errors falls with their square.
+        let own = (FEATURE_ERROR_PX.powi(2) / by_matches).powi(2);
+        let independent = INDEPENDENT_PARTS * overlaps as f64 + own * start.matches() as f64;
+        let is_open = by_matches.sqrt() > FEATURE_ERROR_PX && overlaps <= MOST_OVERLAPS;
+        is_open.then_some(Self { by_matches, independent, ..start })
+    }
+
+    fn matches(&self) -> usize {
+        self.problem.observations.pairs.iter().map(|pair| pair.matches.len()).sum()
+    }
+
+    /// Of both directions of every match.
+    fn mean_square(&self, at: &Parameters) -> f64 {
+        self.problem.matches_cost(at, FINE_HUBER_PX) / (2 * self.matches()).max(1) as f64
+    }
+
+    /// The one at a factor of this logarithm, its rotations refined from those of one nearby.
+    fn candidate(&self, log_factor: f64, rotations: &[Matrix3<f64>]) -> Result<Candidate> {
+        self.context.check_cancelled()?;
+        let focal_px = self.found.focal_px.iter().map(|focal_px| focal_px * log_factor.exp()).collect();
+        let start = Parameters { focal_px, rotations: rotations.to_vec(), lenses: self.found.lenses.clone() };
+        let fixed = IntrinsicsModel::fixed(self.problem.priors.len());
+        let parameters = self.problem.minimize(start, &fixed, FINE_HUBER_PX, self.context)?;
+        let improbable = self.independent * (self.mean_square(&parameters) / self.by_matches).ln();
+        Ok(Candidate { log_factor, parameters, improbable })
+    }
+
+    /// From the matches' own, in steps, to `end` or a little beyond.
+    fn toward(&self, end: f64) -> Result<Vec<Candidate>> {
+        let mut side = vec![self.candidate(0.0, &self.found.rotations)?];
+        self.extend(&mut side, end)?;
+        Ok(side)
+    }
+
+    /// Goes on to `end`, on the same side.
+    fn extend(&self, side: &mut Vec<Candidate>, end: f64) -> Result<()> {
+        while let Some(last) = side.last().filter(|last| last.log_factor.abs() < end.abs()) {
+            let log_factor = (self.step * side.len() as f64).copysign(end);
+            side.push(self.candidate(log_factor, &last.parameters.rotations)?);
+        }
+        Ok(())
+    }
+}
+
 /// What lines tell through the cameras of `candidates`, ordered by their focal lengths.
-fn told_by_lines(priors: &[CameraPrior], candidates: &[Candidate], lines: &[Vec<LineSegment>]) -> Option<FocalByLines> {
+fn told_by_lines(
+    priors: &[CameraPrior],
+    candidates: &[Candidate],
+    step: f64,
+    lines: &[Vec<LineSegment>],
+) -> Option<FocalByLines> {
     let cameras: Vec<Vec<Camera>> = candidates.iter().map(|one| one.parameters.cameras(priors)).collect();
     let frames: Vec<WorkingFrame> = priors.iter().map(|prior| prior.frame).collect();
-    FocalByLines::told(&cameras, candidates.first()?.log_factor, STEP, lines, &frames)
+    FocalByLines::told(&cameras, candidates.first()?.log_factor, step, lines, &frames)
 }
 
 /// What is expected of focal lengths as a whole.

@@ -181,9 +181,9 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
             "Keep the camera's metadata in the files, or overlap the photographs more.",
         ));
     }
-    if let Some(found) = &solution.opened {
+    if let Some(found) = solution.opened.filter(|found| (found.factor - 1.0).abs() >= NOTABLE_CHANGE) {
         let is_recorded = priors.iter().any(|prior| prior.focal_px.is_some());
-        context.report(focal_expected(found, is_recorded));
+        context.report(focal_expected(&found, is_recorded));
     }
     if let Some(doubt_px) = solution.lens_doubt_px.filter(|doubt_px| *doubt_px > DOUBTFUL_LENS_PX) {
         context.report(lens_uncertain(pairs.len(), doubt_px));
@@ -213,6 +213,9 @@ fn lens_uncertain(overlaps: usize, doubt_px: f64) -> Diagnostic {
         "Overlap more photographs, or tell the lens (--lens-from, --lens).",
     )
 }
+
+/// Change of a focal length, relative, that is worth a word.
+const NOTABLE_CHANGE: f64 = 0.005;
 
 /// Says that lines, or what is expected of focal lengths, took part in them; `is_recorded`: by metadata.
 fn focal_expected(found: &OpenFocal, is_recorded: bool) -> Diagnostic {
