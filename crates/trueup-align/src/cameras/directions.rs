@@ -18,15 +18,12 @@ use trueup_core::camera::Camera;
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
 
-use crate::straightening::straighten_with_pitch;
+use crate::straightening::{PITCH_PRIOR, straighten_with_pitch};
 use crate::vanishing::InterpretationPlanes;
 use crate::vanishing::frame_search::{GUIDING_SIGNIFICANCE, search_frames};
 use crate::vanishing::jackknife::{deviation_of, sectors};
 use crate::vanishing::joint::LineVote;
 
-/// Weight of the expectation that cameras look level against that they are not rolled, for where frames are sought: that of
-/// `similarity.pitch_prior` as it is by default.
-const PITCH_PRIOR: f64 = 0.1;
 /// Fewer sectors with lines tell nothing of how they scatter.
 const FEWEST_SECTORS: usize = 3;
 /// Standard deviation of what all lines of a scene err by alike, relative: what a lens bends, and what is not quite at right angles. Measured: seven pairs of one
@@ -109,8 +106,7 @@ impl FocalByLines {
     ) -> Option<Self> {
         let of_each = MAX_SEGMENTS.div_ceil(frames.len().max(1));
         let vote = |cameras: &Vec<Camera>| {
-            let planes = InterpretationPlanes::of_all(lines, cameras, frames);
-            LineVote::new(&rotations_of(cameras), planes.into_iter().map(|planes| planes.longest(of_each)).collect())
+            LineVote::new(&rotations_of(cameras), InterpretationPlanes::longest_of_all(lines, cameras, frames, of_each))
         };
         let votes: Vec<LineVote> = cameras.iter().map(vote).collect();
         let found = best_frames(&votes, cameras)?;

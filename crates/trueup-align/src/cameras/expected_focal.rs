@@ -29,7 +29,8 @@ const INDEPENDENT_PARTS: f64 = 4.0;
 const MOST_OVERLAPS: usize = 30;
 /// Distance from what is expected, in its standard deviations, up to which it is not asked: it would hardly move anything.
 const AS_EXPECTED: f64 = 0.5;
-/// Step of the search, as the logarithm of a factor. Reasoned: half of what lines scatter by at their surest.
+/// Step of the search, as the logarithm of a factor. Reasoned: the standard deviation of what is looked for is 0.06 at the least, so that a parabola
+/// through three steps follows its peak; a fourth of it moves what comes out by less than a thousandth.
 const STEP: f64 = 0.08;
 /// Most steps from what matches say to what is expected; they are longer where it is farther.
 const MOST_STEPS: f64 = 30.0;
@@ -76,7 +77,10 @@ pub(super) fn expected(
     let expectation = Expectation::of(problem.priors, found, options);
     let Some(search) = FocalSearch::new(problem, found, &expectation, context) else { return Ok(None) };
     let step = search.step;
-    let (mut shorter, mut longer) = (search.toward(-step)?, search.toward(step)?);
+    let own = search.candidate(0.0, &found.rotations)?;
+    let (mut shorter, mut longer) = (Vec::new(), Vec::new());
+    search.extend(&mut shorter, &own, -step)?;
+    search.extend(&mut longer, &own, step)?;
     let is_sure = [&shorter, &longer].iter().filter_map(|side| side.last()).all(|one| one.improbable > SURE);
     let is_told = problem.priors.iter().any(|prior| prior.focal_told);
     let asks_lines = !is_told && !is_sure && lines.iter().filter(|lines| !lines.is_empty()).count() > 1;
@@ -85,9 +89,9 @@ pub(super) fn expected(
         return Ok(None);
     }
     let beyond = if asks_lines { BEYOND } else { step };
-    search.extend(&mut shorter, -expectation.off.max(0.0) - beyond)?;
-    search.extend(&mut longer, (-expectation.off).max(0.0) + beyond)?;
-    let candidates: Vec<Candidate> = shorter.into_iter().skip(1).rev().chain(longer).collect();
+    search.extend(&mut shorter, &own, -expectation.off.max(0.0) - beyond)?;
+    search.extend(&mut longer, &own, (-expectation.off).max(0.0) + beyond)?;
+    let candidates: Vec<Candidate> = shorter.into_iter().rev().chain([own]).chain(longer).collect();
     let by_lines = if asks_lines { told_by_lines(problem.priors, &candidates, step, lines) } else { None };
     if by_lines.is_none() && is_as_expected {
         return Ok(None);
@@ -108,9 +112,9 @@ pub(super) fn expected(
 struct FocalSearch<'a> {
     problem: &'a BundleAdjustment<'a>,
     found: &'a Parameters,
-    /// Mean square distance of matches by `found`, working pixels.
-    by_matches: f64,
-    /// How many of these distances are independent.
+    /// What matches cost by `found`.
+    cost: f64,
+    /// How many of their distances are independent.
     independent: f64,
     /// The logarithm of the factor from one to the next.
     step: f64,
@@ -125,24 +129,19 @@ impl<'a> FocalSearch<'a> {
         expectation: &Expectation,
         context: &'a StageContext<'a>,
     ) -> Option<Self> {
-        let step = STEP.max(expectation.off.abs() / MOST_STEPS);
-        let start = Self { problem, found, by_matches: 0.0, independent: 0.0, step, context };
-        let by_matches = start.mean_square(found);
         let overlaps = problem.observations.pairs.len();
+        let matches: usize = problem.observations.pairs.iter().map(|pair| pair.matches.len()).sum();
+        let cost = problem.matches_cost(found, FINE_HUBER_PX);
+        // Of both directions of every match.
+        let mean_square = cost / (2 * matches).max(1) as f64;
+        if overlaps > MOST_OVERLAPS || mean_square.sqrt() <= FEATURE_ERROR_PX {
+            return None;
+        }
         // What features err by is independent; its share in the errors falls with their square.
-        let own = (FEATURE_ERROR_PX.powi(2) / by_matches).powi(2);
-        let independent = INDEPENDENT_PARTS * overlaps as f64 + own * start.matches() as f64;
-        let is_open = by_matches.sqrt() > FEATURE_ERROR_PX && overlaps <= MOST_OVERLAPS;
-        is_open.then_some(Self { by_matches, independent, ..start })
-    }
-
-    fn matches(&self) -> usize {
-        self.problem.observations.pairs.iter().map(|pair| pair.matches.len()).sum()
-    }
-
-    /// Of both directions of every match.
-    fn mean_square(&self, at: &Parameters) -> f64 {
-        self.problem.matches_cost(at, FINE_HUBER_PX) / (2 * self.matches()).max(1) as f64
+        let own = (FEATURE_ERROR_PX.powi(2) / mean_square).powi(2);
+        let independent = INDEPENDENT_PARTS * overlaps as f64 + own * matches as f64;
+        let step = STEP.max(expectation.off.abs() / MOST_STEPS);
+        Some(Self { problem, found, cost, independent, step, context })
     }
 
     /// The one at a factor of this logarithm, its rotations refined from those of one nearby.
@@ -152,24 +151,20 @@ impl<'a> FocalSearch<'a> {
         let start = Parameters { focal_px, rotations: rotations.to_vec(), lenses: self.found.lenses.clone() };
         let fixed = IntrinsicsModel::fixed(self.problem.priors.len());
         let parameters = self.problem.minimize(start, &fixed, FINE_HUBER_PX, self.context)?;
-        let improbable = self.independent * (self.mean_square(&parameters) / self.by_matches).ln();
+        let improbable = self.independent * (self.problem.matches_cost(&parameters, FINE_HUBER_PX) / self.cost).ln();
         Ok(Candidate { log_factor, parameters, improbable })
     }
 
-    /// From the matches' own, in steps, to `end` or a little beyond.
-    fn toward(&self, end: f64) -> Result<Vec<Candidate>> {
-        let mut side = vec![self.candidate(0.0, &self.found.rotations)?];
-        self.extend(&mut side, end)?;
-        Ok(side)
-    }
-
-    /// Goes on to `end`, on the same side.
-    fn extend(&self, side: &mut Vec<Candidate>, end: f64) -> Result<()> {
-        while let Some(last) = side.last().filter(|last| last.log_factor.abs() < end.abs()) {
-            let log_factor = (self.step * side.len() as f64).copysign(end);
+    /// Goes on to `end` or a little beyond, in steps, on the side of `own`, the matches' own, that `side` holds.
+    fn extend(&self, side: &mut Vec<Candidate>, own: &Candidate, end: f64) -> Result<()> {
+        loop {
+            let last = side.last().unwrap_or(own);
+            if last.log_factor.abs() >= end.abs() {
+                return Ok(());
+            }
+            let log_factor = (self.step * (side.len() + 1) as f64).copysign(end);
             side.push(self.candidate(log_factor, &last.parameters.rotations)?);
         }
-        Ok(())
     }
 }
 

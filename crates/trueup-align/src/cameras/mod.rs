@@ -223,7 +223,7 @@ fn focal_expected(found: &OpenFocal, is_recorded: bool) -> Diagnostic {
     let (change, longer) = (100.0 * (factor - 1.0).abs(), if factor > 1.0 { "longer" } else { "shorter" });
     let by = match (found.by_lines, is_recorded) {
         (true, true) => "the right angles of lines and what the photographs record",
-        (true, false) => "the right angles of lines",
+        (true, false) => "the right angles of lines and what is usual",
         (false, true) => "what the photographs record",
         (false, false) => "what is usual",
     };

@@ -124,10 +124,10 @@ pub(super) fn refine(
     if problem.is_sound(&fine) {
         let few = input.observations.pairs.len() < OVERLAPS_FOR_LENSES && !fine.has_lens();
         let lens_doubt_px = if few { search.doubt_px(&fine, &CameraPrior::lens_groups(priors)) } else { None };
+        // Of photographs that parallax gives focal lengths of their own, no common factor makes angles right.
+        let lines = if per_picture_focal { &[] } else { input.lines };
         let expected = match fine.has_lens() {
-            // Of photographs that parallax gives focal lengths of their own, no common factor makes angles right.
-            false if per_picture_focal => expected_focal::expected(&problem, &fine, &[], options, context)?,
-            false => expected_focal::expected(&problem, &fine, input.lines, options, context)?,
+            false => expected_focal::expected(&problem, &fine, lines, options, context)?,
             true => None,
         };
         let Some(ExpectedFocal { parameters, opened }) = expected else {

@@ -1,6 +1,7 @@
 //! What a user can choose about the similarity prior.
 
 use super::printed::PrintedEquations;
+use crate::straightening::PITCH_PRIOR;
 
 /// Where the turns and scales come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,6 +107,6 @@ trueup_core::options! {
         /// photographers. Raise it if a panorama without buildings leans, lower it for photographs taken steeply up or
         /// down. 0 is the published form, which lets a short sweep with some roll pitch by tens of degrees; it is
         /// what the priors of the published methods always take.
-        pitch_prior: f64 = 0.1, between(0.0, 1.0), "", basic;
+        pitch_prior: f64 = PITCH_PRIOR, between(0.0, 1.0), "", basic;
     }
 }

@@ -10,7 +10,7 @@ use trueup_core::source::WorkingFrame;
 const MIN_LENGTH_PX: f64 = 20.0;
 /// ... and as a fraction of the photograph's diagonal; the larger of both holds.
 const MIN_LENGTH_DIAGONAL: f64 = 0.025;
-/// Most segments used; the longest are kept.
+/// Most segments used of a photograph, unless fewer are asked for; the longest are kept.
 const MAX_SEGMENTS: usize = 400;
 /// A segment this close to the photograph's border, and parallel to it, is an artifact of the frame. Working pixels.
 const BORDER_MARGIN_PX: f64 = 5.0;
@@ -47,6 +47,11 @@ impl InterpretationPlanes {
     ///
     /// Empty if the focal length or the frame is not a positive number.
     pub(crate) fn new(lines: &[LineSegment], camera: &Camera, frame: &WorkingFrame) -> Self {
+        Self::longest(lines, camera, frame, MAX_SEGMENTS)
+    }
+
+    /// [`Self::new`] of at most so many segments.
+    fn longest(lines: &[LineSegment], camera: &Camera, frame: &WorkingFrame, most: usize) -> Self {
         let focal_px = camera.focal_px;
         let usable = focal_px.is_finite() && focal_px > 0.0 && frame.diagonal().is_finite();
         let min_length = MIN_LENGTH_PX.max(MIN_LENGTH_DIAGONAL * frame.diagonal());
@@ -61,7 +66,7 @@ impl InterpretationPlanes {
             .collect();
         // Ties are broken by the position in the input, so that the order is the same everywhere.
         kept.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        kept.truncate(MAX_SEGMENTS);
+        kept.truncate(most);
         let mut planes = Self::with_capacity(kept.len(), camera);
         for (index, _) in kept {
             planes.push(index, &lines[index], camera);
@@ -71,23 +76,18 @@ impl InterpretationPlanes {
 
     /// Those of every photograph: [`Self::new`] of its lines, its camera and its frame.
     pub(crate) fn of_all(lines: &[Vec<LineSegment>], cameras: &[Camera], frames: &[WorkingFrame]) -> Vec<Self> {
-        let of_one = |index: usize| Self::new(&lines[index], &cameras[index], &frames[index]);
-        (0..cameras.len()).into_par_iter().map(of_one).collect()
+        Self::longest_of_all(lines, cameras, frames, MAX_SEGMENTS)
     }
 
-    /// The longest `count` of them.
-    pub(crate) fn longest(mut self, count: usize) -> Self {
-        self.normals.truncate(count);
-        self.moments.truncate(count);
-        self.midpoints.truncate(count);
-        if let Some(rays) = &mut self.middle_rays {
-            rays.truncate(count);
-        }
-        self.lengths.truncate(count);
-        self.weights.truncate(count);
-        self.indices.truncate(count);
-        self.total_weight = self.weights.iter().sum();
-        self
+    /// [`Self::of_all`] with at most so many segments of each photograph.
+    pub(crate) fn longest_of_all(
+        lines: &[Vec<LineSegment>],
+        cameras: &[Camera],
+        frames: &[WorkingFrame],
+        most: usize,
+    ) -> Vec<Self> {
+        let of_one = |index: usize| Self::longest(&lines[index], &cameras[index], &frames[index], most);
+        (0..cameras.len()).into_par_iter().map(of_one).collect()
     }
 
     fn with_capacity(count: usize, camera: &Camera) -> Self {

@@ -109,7 +109,8 @@ pub(crate) fn sectors(vote: &LineVote, frame: &Matrix3<f64>, vertical: usize) ->
     vote.by_midpoint(|toward| sector(frame, vertical, &toward))
 }
 
-/// Standard deviation of a number that was found without one group each, two or more; it grows as Student's t does of few.
+/// Standard deviation of a number that was found without one group each, two or more; it grows as Student's t does of few. What [`AxisScatter`]
+/// is of an axis.
 pub(crate) fn deviation_of(without_each: &[f64]) -> f64 {
     let groups = without_each.len() as f64;
     let mean = without_each.iter().sum::<f64>() / groups;
@@ -155,6 +156,13 @@ mod tests {
         assert!((found(0) / (few * 3e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
         assert!((found(2) / (few * 1.5e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
         assert_eq!(AxisScatter::of(&frames[..1], 0), None);
+    }
+
+    /// By hand: mean 4, squares 4 + 1 + 9 = 14, of which 2/3 count, times 1 + 0.66 / 2: 1.33 sqrt(9.3333) = 4.0632.
+    #[test]
+    fn the_jackknife_of_known_numbers() {
+        assert!((deviation_of(&[2.0, 3.0, 7.0]) - 4.0632).abs() < 1e-4);
+        assert_eq!(deviation_of(&[5.0; 4]), 0.0);
     }
 
     /// By hand: of variances 8 and 0 about x and z, mean 4, three groups have two degrees of freedom: (2 x 8 + 2 x 4) / 4 = 6 and (2 x 0 + 2 x 4) / 4 = 2,

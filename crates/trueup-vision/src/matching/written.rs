@@ -57,18 +57,18 @@ pub(super) fn without_written(
     a: &Features,
     frames: [&WorkingFrame; 2],
 ) -> Vec<PutativeMatch> {
-    let held = |writing: &Writing| putative.iter().filter(|one| writing.holds(one)).count();
+    let held = |writing: Writing| putative.iter().map(|one| writing.holds(one)).collect::<Vec<bool>>();
+    let count = |held: &[bool]| held.iter().filter(|&&is_held| is_held).count();
     // Of equals the first.
-    let most = Writing::all(frames).into_iter().map(|writing| (held(&writing), writing));
-    let most = most.reduce(|most, one| if one.0 > most.0 { one } else { most });
-    let Some((_, writing)) = most.filter(|(count, _)| *count > 0) else { return putative };
-    let written: BTreeSet<[i64; 2]> =
-        putative.iter().filter(|one| writing.holds(one)).map(|one| square(one.at.in_a)).collect();
+    let most = |most: Vec<bool>, one: Vec<bool>| if count(&one) > count(&most) { one } else { most };
+    let on_writing = Writing::all(frames).into_iter().map(held).reduce(most).unwrap_or_default();
+    let of_writing = putative.iter().zip(&on_writing).filter(|(_, is_held)| **is_held);
+    let written: BTreeSet<[i64; 2]> = of_writing.map(|(one, _)| square(one.at.in_a)).collect();
     let featured: BTreeSet<[i64; 2]> = a.points.iter().map(|point| square(point.position)).collect();
     if written.len() as f64 > MOST_ROOM * featured.len() as f64 {
         return putative;
     }
-    putative.into_iter().filter(|one| !writing.holds(one)).collect()
+    putative.into_iter().zip(on_writing).filter(|(_, is_held)| !is_held).map(|(one, _)| one).collect()
 }
 
 fn square(position: [f64; 2]) -> [i64; 2] {
