@@ -16,7 +16,7 @@ use trueup_core::{Result, StageContext};
 
 use super::equations::{NormalEquations, NormalPattern, Pull};
 use super::intrinsics::{FOCAL, IntrinsicsModel, LensState, standard_deviation};
-use super::levenberg_marquardt::{self, LeastSquares};
+use super::levenberg_marquardt::{self, LeastSquares, SETTLED};
 use super::observations::{Observations, PairObservations};
 use super::pair_cost::{Columns, LENS_LOCAL, PINHOLE_LOCAL, PairTerm, pair_cost, pair_distances};
 use super::prior::CameraPrior;
@@ -79,21 +79,34 @@ impl BundleAdjustment<'_> {
         huber_px: f64,
         context: &StageContext,
     ) -> Result<Parameters> {
+        self.minimize_until(SETTLED, parameters, model, huber_px, context)
+    }
+
+    /// [`Self::minimize`] until a step decreases the cost by less than `settled` of it.
+    pub(super) fn minimize_until(
+        &self,
+        settled: f64,
+        parameters: Parameters,
+        model: &IntrinsicsModel,
+        huber_px: f64,
+        context: &StageContext,
+    ) -> Result<Parameters> {
         match parameters.has_lens() || model.has_lens() {
-            false => self.minimize_by::<PINHOLE_LOCAL>(parameters, model, huber_px, context),
-            true => self.minimize_by::<LENS_LOCAL>(parameters, model, huber_px, context),
+            false => self.minimize_by::<PINHOLE_LOCAL>(settled, parameters, model, huber_px, context),
+            true => self.minimize_by::<LENS_LOCAL>(settled, parameters, model, huber_px, context),
         }
     }
 
     fn minimize_by<const LOCAL: usize>(
         &self,
+        settled: f64,
         parameters: Parameters,
         model: &IntrinsicsModel,
         huber_px: f64,
         context: &StageContext,
     ) -> Result<Parameters> {
         let pattern = self.pattern::<LOCAL>(model)?;
-        levenberg_marquardt::minimize(&Pass { problem: self, model, huber_px, pattern }, parameters, context)
+        levenberg_marquardt::minimize(&Pass { problem: self, model, huber_px, pattern }, parameters, settled, context)
     }
 
     /// Refines settled `parameters` once more, with the limit that suits the matches: their median distance, where most of them are

@@ -5,12 +5,16 @@
 //! remains is how badly matches meet, and that grows little over a wide range of focal lengths. So where they do not meet to the error of a feature,
 //! the directions of lines ([`super::directions`]) and metadata, or what is usual, have their say.
 //!
+//! So it is where a lens bends: how much it does trades for the focal length, and is refined anew at each.
+//!
 //! # Source
 //! The focal length that is most probable by Bayes' theorem. Errors of unknown size are integrated out (Gelman and others, "Bayesian Data
-//! Analysis", section 3.2): the likelihood of n of them falls as their mean square to the power of n / 2.
+//! Analysis", section 3.2): the likelihood of n of them falls as their mean square to the power of n / 2. Witnesses that may be wrong altogether have the
+//! tails of Student's t (the same, chapter 17): where two agree, a third that contradicts both is left.
 
 use nalgebra::Matrix3;
 use trueup_core::camera::Camera;
+use trueup_core::geometry::{exp_rotation, log_rotation};
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
@@ -34,8 +38,13 @@ const AS_EXPECTED: f64 = 0.5;
 const STEP: f64 = 0.08;
 /// Most steps from what matches say to what is expected; they are longer where it is farther.
 const MOST_STEPS: f64 = 30.0;
+/// Relative decrease of the cost below which the cameras of one step have settled: what that makes improbable falls by so much, a few hundred times.
+const SETTLED: f64 = 1e-4;
 /// How far the search goes beyond what matches say and what is expected, in the same terms, where lines are asked.
 const BEYOND: f64 = 0.4;
+/// Of how many errors' worth what matches, and metadata, say is as a whole: who walks along a facade stretches all overlaps alike, and a picture that was cut out
+/// of another keeps its metadata. Reasoned: with four it has the tails of Student's t with three degrees of freedom, the fewest that have a variance.
+const ERRORS_OF_WITNESS: f64 = 4.0;
 /// How improbable the focal lengths one step aside are by matches that are so sure of theirs, twice as sure as lines, that these are not asked.
 const SURE: f64 = 7.0;
 
@@ -58,30 +67,35 @@ pub(super) struct OpenFocal {
 struct Candidate {
     log_factor: f64,
     parameters: Parameters,
-    /// Minus twice the logarithm of its probability by the matches.
+    /// Minus twice the logarithm of its probability by matches and edges, but for a constant, were these right about all but chance.
     improbable: f64,
 }
 
-/// The cameras of `found`, refined without lenses, with the focal lengths that are most probable; `None` where matches are sure of theirs, or
-/// tell what is expected, and `lines` say nothing else.
+/// The cameras of `found`, whose unknowns are those of `model`, with the focal lengths that are most probable; `None` where matches are sure of
+/// theirs, or tell what is expected, and `lines` say nothing else.
 ///
 /// # Errors
 /// [`trueup_core::Error::Cancelled`].
 pub(super) fn expected(
     problem: &BundleAdjustment<'_>,
     found: &Parameters,
+    model: &IntrinsicsModel,
     lines: &[Vec<LineSegment>],
     options: &CameraOptions,
     context: &StageContext,
 ) -> Result<Option<ExpectedFocal>> {
     let expectation = Expectation::of(problem.priors, found, options);
-    let Some(search) = FocalSearch::new(problem, found, &expectation, context) else { return Ok(None) };
+    let Some(search) = FocalSearch::new(problem, found, model, &expectation, context) else { return Ok(None) };
     let step = search.step;
-    let own = search.candidate(0.0, &found.rotations)?;
+    let own = Candidate { log_factor: 0.0, parameters: found.clone(), improbable: 0.0 };
     let (mut shorter, mut longer) = (Vec::new(), Vec::new());
     search.extend(&mut shorter, &own, -step)?;
     search.extend(&mut longer, &own, step)?;
     let is_sure = [&shorter, &longer].iter().filter_map(|side| side.last()).all(|one| one.improbable > SURE);
+    // What is less sure would move nothing, and a parabola through steps tells less exactly where it is.
+    if is_sure && expectation.sd > STEP {
+        return Ok(None);
+    }
     let is_told = problem.priors.iter().any(|prior| prior.focal_told);
     let asks_lines = !is_told && !is_sure && lines.iter().filter(|lines| !lines.is_empty()).count() > 1;
     let is_as_expected = expectation.off.abs() <= AS_EXPECTED * expectation.sd;
@@ -96,14 +110,17 @@ pub(super) fn expected(
     if by_lines.is_none() && is_as_expected {
         return Ok(None);
     }
+    let least = candidates.iter().map(|one| one.improbable).fold(f64::INFINITY, f64::min);
     let probable = candidates.iter().map(|one| {
         let lines = by_lines.map_or(0.0, |told| told.improbable(one.log_factor));
-        -(one.improbable + expectation.improbable(one.log_factor) + lines)
+        let matches = tailed(one.improbable - least);
+        -(matches + expectation.improbable(one.log_factor) + lines)
     });
     let Some(best) = peak(&probable.collect::<Vec<f64>>()) else { return Ok(None) };
     let nearest = &candidates[best.round() as usize];
     let log_factor = nearest.log_factor + step * (best - best.round());
-    let Candidate { parameters, .. } = search.candidate(log_factor, &nearest.parameters.rotations)?;
+    let start = search.stretched(&nearest.parameters, log_factor);
+    let parameters = problem.minimize(start, &search.model, FINE_HUBER_PX, context)?;
     let opened = OpenFocal { factor: log_factor.exp(), by_lines: by_lines.is_some() };
     Ok(Some(ExpectedFocal { parameters, opened }))
 }
@@ -112,10 +129,12 @@ pub(super) fn expected(
 struct FocalSearch<'a> {
     problem: &'a BundleAdjustment<'a>,
     found: &'a Parameters,
-    /// What matches cost by `found`.
-    cost: f64,
+    /// What is refined at each focal length.
+    model: IntrinsicsModel,
+    /// What matches and edges cost by `found`.
+    costs: [f64; 2],
     /// How many of their distances are independent.
-    independent: f64,
+    independent: [f64; 2],
     /// The logarithm of the factor from one to the next.
     step: f64,
     context: &'a StageContext<'a>,
@@ -126,33 +145,57 @@ impl<'a> FocalSearch<'a> {
     fn new(
         problem: &'a BundleAdjustment<'a>,
         found: &'a Parameters,
+        model: &IntrinsicsModel,
         expectation: &Expectation,
         context: &'a StageContext<'a>,
     ) -> Option<Self> {
         let overlaps = problem.observations.pairs.len();
         let matches: usize = problem.observations.pairs.iter().map(|pair| pair.matches.len()).sum();
-        let cost = problem.matches_cost(found, FINE_HUBER_PX);
+        let costs = costs(problem, found);
         // Of both directions of every match.
-        let mean_square = cost / (2 * matches).max(1) as f64;
+        let mean_square = costs[0] / (2 * matches).max(1) as f64;
         if overlaps > MOST_OVERLAPS || mean_square.sqrt() <= FEATURE_ERROR_PX {
             return None;
         }
         // What features err by is independent; its share in the errors falls with their square.
         let own = (FEATURE_ERROR_PX.powi(2) / mean_square).powi(2);
         let independent = INDEPENDENT_PARTS * overlaps as f64 + own * matches as f64;
+        // Edges in one part of a photograph are bent together; pinholes bend none.
+        let curves = if model.has_lens() { problem.curves.clusters.len() as f64 } else { 0.0 };
         let step = STEP.max(expectation.off.abs() / MOST_STEPS);
-        Some(Self { problem, found, cost, independent, step, context })
+        Some(Self {
+            problem,
+            found,
+            model: model.with_focal_held(),
+            costs,
+            independent: [independent, curves],
+            step,
+            context,
+        })
     }
 
-    /// The one at a factor of this logarithm, its rotations refined from those of one nearby.
-    fn candidate(&self, log_factor: f64, rotations: &[Matrix3<f64>]) -> Result<Candidate> {
+    /// The one at a factor of this logarithm, its rotations and lenses refined from those of one nearby.
+    fn candidate(&self, log_factor: f64, nearby: &Parameters) -> Result<Candidate> {
         self.context.check_cancelled()?;
-        let focal_px = self.found.focal_px.iter().map(|focal_px| focal_px * log_factor.exp()).collect();
-        let start = Parameters { focal_px, rotations: rotations.to_vec(), lenses: self.found.lenses.clone() };
-        let fixed = IntrinsicsModel::fixed(self.problem.priors.len());
-        let parameters = self.problem.minimize(start, &fixed, FINE_HUBER_PX, self.context)?;
-        let improbable = self.independent * (self.problem.matches_cost(&parameters, FINE_HUBER_PX) / self.cost).ln();
+        let start = self.stretched(nearby, log_factor);
+        let parameters = self.problem.minimize_until(SETTLED, start, &self.model, FINE_HUBER_PX, self.context)?;
+        let costs = costs(self.problem, &parameters);
+        let told = (0..costs.len()).filter(|&by| self.costs[by] > 0.0);
+        let improbable = told.map(|by| self.independent[by] * (costs[by] / self.costs[by]).ln()).sum();
         Ok(Candidate { log_factor, parameters, improbable })
+    }
+
+    /// Cameras near `nearby` with focal lengths at a factor of this logarithm: with longer ones photographs lie less far apart, and what bends
+    /// them as far counts for more.
+    fn stretched(&self, nearby: &Parameters, log_factor: f64) -> Parameters {
+        let focal_px: Vec<f64> = self.found.focal_px.iter().map(|focal_px| focal_px * log_factor.exp()).collect();
+        let by: Vec<f64> = focal_px.iter().zip(&nearby.focal_px).map(|(to, from)| to / from).collect();
+        let anchor = nearby.rotations[self.problem.reference];
+        let turned = |(rotation, by): (&Matrix3<f64>, &f64)| {
+            exp_rotation(&(log_rotation(&(rotation * anchor.transpose())) / *by)) * anchor
+        };
+        let rotations = nearby.rotations.iter().zip(&by).map(turned).collect();
+        Parameters { focal_px, rotations, lenses: nearby.lenses.clone() }
     }
 
     /// Goes on to `end` or a little beyond, in steps, on the side of `own`, the matches' own, that `side` holds.
@@ -163,9 +206,19 @@ impl<'a> FocalSearch<'a> {
                 return Ok(());
             }
             let log_factor = (self.step * (side.len() + 1) as f64).copysign(end);
-            side.push(self.candidate(log_factor, &last.parameters.rotations)?);
+            side.push(self.candidate(log_factor, &last.parameters)?);
         }
     }
+}
+
+/// What this many standard deviations squared make improbable of a witness that may be wrong altogether: as a bell does where they are few.
+fn tailed(square: f64) -> f64 {
+    ERRORS_OF_WITNESS * (square / ERRORS_OF_WITNESS).ln_1p()
+}
+
+/// What matches and edges cost.
+fn costs(problem: &BundleAdjustment<'_>, at: &Parameters) -> [f64; 2] {
+    [problem.matches_cost(at, FINE_HUBER_PX), problem.curves_cost(at, FINE_HUBER_PX)]
 }
 
 /// What lines tell through the cameras of `candidates`, ordered by their focal lengths.
@@ -187,6 +240,8 @@ struct Expectation {
     off: f64,
     /// Its standard deviation.
     sd: f64,
+    /// Whether it is what metadata say, which may be those of another picture.
+    is_recorded: bool,
 }
 
 impl Expectation {
@@ -200,12 +255,13 @@ impl Expectation {
         let off = |(prior, &focal_px): (&CameraPrior, &f64)| (focal_px / prior.expected_focal_px()).ln();
         let (sum, count) = asked.clone().map(off).fold((0.0, 0_usize), |(sum, count), one| (sum + one, count + 1));
         let sds = asked.map(|(prior, _)| if known { prior.focal_sd(options) } else { USUAL_FOCAL_SD });
-        Self { off: sum / count.max(1) as f64, sd: sds.fold(0.0, f64::max) }
+        Self { off: sum / count.max(1) as f64, sd: sds.fold(0.0, f64::max), is_recorded: known && !told }
     }
 
     /// Minus twice the logarithm of its probability when the focal lengths are longer by a factor of this logarithm.
     fn improbable(&self, log_factor: f64) -> f64 {
-        ((self.off + log_factor) / self.sd).powi(2)
+        let square = ((self.off + log_factor) / self.sd).powi(2);
+        if self.is_recorded { tailed(square) } else { square }
     }
 }
 

@@ -1,12 +1,13 @@
 //! Focal lengths of a photographer who went a step aside.
 
+use super::super::intrinsics::{FOCAL, LensState, RADIAL, only_focal};
 use super::super::observations::{MATCHES_PER_PAIR, Observations};
 use super::super::straightness::CurveObservations;
-use super::super::tests::joined;
+use super::super::tests::{ROLLS, bent, joined, matched, row};
 use super::super::{CameraInput, run};
 use super::*;
 use nalgebra::{Matrix3, Vector3};
-use trueup_core::camera::Camera;
+use trueup_core::camera::{Camera, INTRINSICS};
 use trueup_core::geometry::rotation_about_y;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::{PairMatches, PointMatch};
@@ -119,15 +120,15 @@ fn a_step_aside_leaves_a_usual_focal_length_where_none_is_recorded() {
         lenses: vec![Default::default(); 2],
     };
     let context = StageContext::default();
-    let by_matches =
-        problem.minimize(start, &IntrinsicsModel::shared(&priors), FINE_HUBER_PX, &context).expect("solvable");
-    let expected = expected(&problem, &by_matches, &[], &CameraOptions::default(), &context).expect("solvable");
+    let shared = IntrinsicsModel::shared(&priors);
+    let by_matches = problem.minimize(start, &shared, FINE_HUBER_PX, &context).expect("solvable");
+    let expected =
+        expected(&problem, &by_matches, &shared, &[], &CameraOptions::default(), &context).expect("solvable");
     let expected = expected.expect("the wall leaves it open");
     // 0.85 of 800 px.
     let off = |focal_px: f64| (focal_px / 680.0).ln().abs();
     let (before, after) = (off(by_matches.focal_px[0]), off(expected.parameters.focal_px[0]));
-    // A search in steps a fourth as long ends at 0.2092.
-    assert!((before - 0.3446).abs() < 1e-3 && (after - 0.2092).abs() < 1e-3, "{before} {after}");
+    assert!(before > 0.2 && after < 0.6 * before, "{before} {after}");
     assert!((expected.parameters.focal_px[0] / by_matches.focal_px[0] / expected.opened.factor - 1.0).abs() < 1e-12);
 }
 
@@ -135,9 +136,53 @@ fn a_step_aside_leaves_a_usual_focal_length_where_none_is_recorded() {
 /// nothing.
 #[test]
 fn what_is_expected_falls_off_as_a_bell() {
-    let expectation = Expectation { off: 2.0_f64.ln(), sd: 0.4 };
+    let expectation = Expectation { off: 2.0_f64.ln(), sd: 0.4, is_recorded: false };
     assert!((expectation.improbable(0.0) - 3.003).abs() < 1e-3);
     assert!(expectation.improbable(0.5_f64.ln()).abs() < 1e-12);
+}
+
+/// By hand: a witness of four errors' worth, (0.693 / 0.1)^2 = 48.05 off, makes 4 ln(1 + 48.05 / 4) = 10.26 improbable; one that is off by little, its square.
+#[test]
+fn what_metadata_say_may_be_wrong_altogether() {
+    let expectation = Expectation { off: 2.0_f64.ln(), sd: 0.1, is_recorded: true };
+    assert!((expectation.improbable(0.0) - 10.263).abs() < 1e-3);
+    assert!((tailed(1e-3) - 1e-3).abs() < 1e-6 && tailed(0.0) == 0.0);
+}
+
+/// Three photographs through a lens that bends, twice as far off as features: 8 % aside of the focal length, another lens makes their matches meet
+/// better than the same one.
+#[test]
+fn lenses_are_refined_anew_at_each_focal_length() {
+    let truth = bent(row(ROLLS)[..3].to_vec(), [-0.08, 0.0, 0.0, 0.0], [0.0; 2]);
+    let pairs = matched(&truth, 0.6, 0.0);
+    let priors = [CameraPrior::unknown(FRAME, 0); 3];
+    let observations = Observations::choose(&priors, &pairs.iter().collect::<Vec<_>>(), MATCHES_PER_PAIR);
+    let problem = BundleAdjustment {
+        priors: &priors,
+        observations: &observations,
+        curves: &CurveObservations::default(),
+        start_focal_px: vec![650.0; 3],
+        reference: 0,
+        focal_sd: vec![1.0; 3],
+    };
+    let context = StageContext::default();
+    let lens = LensState { terms: truth[0].lens.terms(), ..LensState::default() };
+    let found = Parameters {
+        focal_px: vec![650.0; 3],
+        rotations: truth.iter().map(|camera| camera.rotation() * truth[0].rotation().transpose()).collect(),
+        lenses: vec![lens; 3],
+    };
+    let bending = |free: [bool; INTRINSICS]| IntrinsicsModel::grouped(&[0; 3], &[free]);
+    let cost_aside = |model: &IntrinsicsModel| {
+        let expectation = Expectation::of(&priors, &found, &CameraOptions::default());
+        let search = FocalSearch::new(&problem, &found, model, &expectation, &context).expect("worse than features");
+        let aside = search.candidate(STEP, &found).expect("solvable");
+        assert!((aside.parameters.focal_px[0] / 650.0).ln() - STEP < 1e-12);
+        (costs(&problem, &aside.parameters)[0], aside.parameters.lenses[0].terms.radial[0])
+    };
+    let with_lens = bending(std::array::from_fn(|term| term == FOCAL || term == RADIAL));
+    let ((anew, k1), (held, same)) = (cost_aside(&with_lens), cost_aside(&bending(only_focal())));
+    assert!(anew < 0.9 * held && k1 != same, "{anew} {held} {k1}");
 }
 
 /// Told 660 px where matches say 1320, beside one with 1320 recorded and one of which nothing is known: what is told alone is asked, to 2 %.

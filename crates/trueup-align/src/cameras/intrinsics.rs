@@ -139,6 +139,14 @@ impl IntrinsicsModel {
         Self { parameters_of: group_of.iter().map(|&group| columns[group]).collect(), parameters }
     }
 
+    /// The same with all focal lengths held fixed.
+    pub(super) fn with_focal_held(&self) -> Self {
+        let is_focal = |parameter: usize| self.parameters_of.iter().any(|of| of[FOCAL] == Some(parameter));
+        let kept: Vec<usize> = (0..self.parameters).filter(|&parameter| !is_focal(parameter)).collect();
+        let renumbered = |of: &[Option<usize>; INTRINSICS]| of.map(|column| kept.binary_search(&column?).ok());
+        Self { parameters_of: self.parameters_of.iter().map(renumbered).collect(), parameters: kept.len() }
+    }
+
     /// Whether anything but focal lengths is free.
     pub(super) fn has_lens(&self) -> bool {
         self.parameters_of.iter().any(|of| of[FOCAL + 1..].iter().any(Option::is_some))
@@ -148,4 +156,22 @@ impl IntrinsicsModel {
 /// The focal length alone.
 pub(super) fn only_focal() -> FreeTerms {
     std::array::from_fn(|intrinsic| intrinsic == FOCAL)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two groups, the first with a focal length and k1, the second with a focal length, k1 and k2: what is left is counted 0, 1, 2.
+    #[test]
+    fn focal_lengths_are_held_and_the_others_counted_anew() {
+        let of = |terms: &[usize]| -> FreeTerms { std::array::from_fn(|term| terms.contains(&term)) };
+        let free = [of(&[FOCAL, RADIAL]), of(&[FOCAL, RADIAL, RADIAL + 1])];
+        let held = IntrinsicsModel::grouped(&[0, 1, 0], &free).with_focal_held();
+        assert_eq!(held.parameters, 3);
+        let column = |photograph: usize, term: usize| held.parameters_of[photograph][term];
+        assert!((0..3).all(|photograph| column(photograph, FOCAL).is_none()));
+        let first = (Some(0), None);
+        assert_eq!([0, 1, 2].map(|k| (column(k, RADIAL), column(k, RADIAL + 1))), [first, (Some(1), Some(2)), first]);
+    }
 }

@@ -14,8 +14,8 @@ const MAX_ITERATIONS: usize = 100;
 const FIRST_DAMPING: f64 = 1e-4;
 /// Damping beyond which no step is tried any more.
 const LARGEST_DAMPING: f64 = 1e12;
-/// Relative decrease of the cost below which a problem has settled.
-const SETTLED: f64 = 1e-8;
+/// Relative decrease of the cost below which a problem has settled to what comes of it in the end.
+pub(super) const SETTLED: f64 = 1e-8;
 
 /// A sum of squares over a state.
 pub(super) trait LeastSquares {
@@ -32,11 +32,16 @@ pub(super) trait LeastSquares {
     fn moved(&self, state: &Self::State, step: &faer::Mat<f64>) -> Self::State;
 }
 
-/// Refines `state` until its cost settles: until a step hardly decreases it, or fails and would hardly by its model.
+/// Refines `state` until its cost settles: until a step decreases it by less than `settled` of it, or fails and would by its model.
 ///
 /// # Errors
 /// [`trueup_core::Error::Cancelled`].
-pub(super) fn minimize<P: LeastSquares>(problem: &P, mut state: P::State, context: &StageContext) -> Result<P::State> {
+pub(super) fn minimize<P: LeastSquares>(
+    problem: &P,
+    mut state: P::State,
+    settled: f64,
+    context: &StageContext,
+) -> Result<P::State> {
     let mut cost = problem.cost(&state);
     let mut damping = FIRST_DAMPING;
     for _ in 0..MAX_ITERATIONS {
@@ -57,12 +62,12 @@ pub(super) fn minimize<P: LeastSquares>(problem: &P, mut state: P::State, contex
                 break;
             }
             // More damping promises less still.
-            if promised(&equations, &step) < SETTLED * cost {
+            if promised(&equations, &step) < settled * cost {
                 break;
             }
             damping *= 10.0;
         }
-        if decrease < SETTLED {
+        if decrease < settled {
             break;
         }
     }
@@ -121,7 +126,7 @@ mod tests {
     }
 
     fn minimized(problem: &Parabola) -> f64 {
-        minimize(problem, 0.0, &StageContext::default()).expect("not cancelled")
+        minimize(problem, 0.0, SETTLED, &StageContext::default()).expect("not cancelled")
     }
 
     /// At the minimum, by a slope of 1e-6 in place of 0: a step of 1e-6 that promises 2e-12 of 1. It is tried once, not with seventeen dampings.

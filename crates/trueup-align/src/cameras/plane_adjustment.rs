@@ -16,7 +16,7 @@ use trueup_core::{Result, StageContext};
 
 use super::equations::{NormalEquations, NormalPattern, Pull};
 use super::intrinsics::{FOCAL, IntrinsicsModel, LensState, RADIAL, standard_deviation};
-use super::levenberg_marquardt::{self, LeastSquares};
+use super::levenberg_marquardt::{self, LeastSquares, SETTLED};
 use super::observations::{Observations, PairObservations};
 use super::pair_cost::{Columns, PairTerm, huber};
 use super::plane_camera::PlaneCamera;
@@ -143,7 +143,7 @@ impl PlaneAdjustment<'_> {
     ) -> Result<PlaneParameters> {
         let columns = self.observations.pairs.iter().map(|pair| self.columns(pair, model)).collect();
         let pattern = NormalPattern::new(OWN * self.priors.len() + model.parameters, columns)?;
-        levenberg_marquardt::minimize(&Pass { problem: self, model, huber_px, pattern }, parameters, context)
+        levenberg_marquardt::minimize(&Pass { problem: self, model, huber_px, pattern }, parameters, SETTLED, context)
     }
 
     /// The sum of squares that is minimized.

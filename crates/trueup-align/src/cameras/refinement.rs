@@ -110,36 +110,62 @@ pub(super) fn refine(
         !per_picture_focal
             || cost_without_pulls(&problem, &lens.parameters) < cost_without_pulls(&problem, &fine) && !is_zoomed()
     };
+    let end = End { problem: &problem, for_lenses: &for_lenses, lines: input.lines, options, context };
     if let Some(FoundLenses { parameters, model }) = with_lens.filter(explains_more) {
-        let parameters = for_lenses.sharpened(parameters, &model, context)?;
-        return Ok(Refined::of(parameters, false));
+        return end.refined(Found { parameters, model, per_picture_focal: false });
     }
     if per_picture_focal && problem.is_sound(&fine) {
         let settings = settings(&fine, &CameraPrior::lens_groups(priors));
         if let Some(FoundLenses { parameters, model }) = search.find(&fine, &settings)? {
-            let parameters = for_lenses.sharpened(parameters, &model, context)?;
-            return Ok(Refined::of(parameters, per_picture_focal));
+            return end.refined(Found { parameters, model, per_picture_focal });
         }
     }
     if problem.is_sound(&fine) {
         let few = input.observations.pairs.len() < OVERLAPS_FOR_LENSES && !fine.has_lens();
         let lens_doubt_px = if few { search.doubt_px(&fine, &CameraPrior::lens_groups(priors)) } else { None };
-        // Of photographs that parallax gives focal lengths of their own, no common factor makes angles right.
-        let lines = if per_picture_focal { &[] } else { input.lines };
-        let expected = match fine.has_lens() {
-            false => expected_focal::expected(&problem, &fine, lines, options, context)?,
-            true => None,
-        };
-        let Some(ExpectedFocal { parameters, opened }) = expected else {
-            let parameters = problem.sharpened(fine, &model, context)?;
-            return Ok(Refined { lens_doubt_px, ..Refined::of(parameters, per_picture_focal) });
-        };
-        let parameters = problem.sharpened(parameters, &IntrinsicsModel::fixed(priors.len()), context)?;
-        let by_matches = Some(ByMatches { parameters: fine, opened });
-        return Ok(Refined { lens_doubt_px, by_matches, ..Refined::of(parameters, per_picture_focal) });
+        let refined = end.refined(Found { parameters: fine, model, per_picture_focal })?;
+        return Ok(Refined { lens_doubt_px, ..refined });
     }
     let parameters = with_expected_focal(&problem, start, context)?;
     Ok(Refined { focal_failed: true, ..Refined::of(parameters, false) })
+}
+
+/// Cameras that matches and edges tell, with what was free.
+struct Found {
+    parameters: Parameters,
+    model: IntrinsicsModel,
+    per_picture_focal: bool,
+}
+
+/// What the cameras that were found are refined by in the end.
+struct End<'a> {
+    problem: &'a BundleAdjustment<'a>,
+    for_lenses: &'a BundleAdjustment<'a>,
+    /// Line segments of each photograph.
+    lines: &'a [Vec<LineSegment>],
+    options: &'a CameraOptions,
+    context: &'a StageContext<'a>,
+}
+
+impl End<'_> {
+    /// What was found, with the focal lengths that are most probable where matches leave them open.
+    fn refined(&self, found: Found) -> Result<Refined> {
+        let Found { parameters, model, per_picture_focal } = found;
+        let is_lens_told = parameters.has_lens() && !model.has_lens();
+        // Of photographs that parallax gives focal lengths of their own, no common factor makes angles right.
+        let lines = if per_picture_focal { &[] } else { self.lines };
+        let expected = match is_lens_told {
+            true => None,
+            false => expected_focal::expected(self.problem, &parameters, &model, lines, self.options, self.context)?,
+        };
+        let precise = if model.has_lens() { self.for_lenses } else { self.problem };
+        let Some(ExpectedFocal { parameters: expected, opened }) = expected else {
+            return Ok(Refined::of(precise.sharpened(parameters, &model, self.context)?, per_picture_focal));
+        };
+        let sharp = precise.sharpened(expected, &model.with_focal_held(), self.context)?;
+        let by_matches = Some(ByMatches { parameters, opened });
+        Ok(Refined { by_matches, ..Refined::of(sharp, per_picture_focal) })
+    }
 }
 
 /// What matches and edges alone cost.

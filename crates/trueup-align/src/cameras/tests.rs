@@ -29,7 +29,7 @@ fn camera(focal: f64, yaw: f64, pitch: f64, roll: f64) -> Camera {
 
 /// Matches between all photographs that overlap, with Gaussian-like noise (sum of uniforms) of standard deviation
 /// `noise_px` and a share of gross errors.
-fn matched(truth: &[Camera], noise_px: f64, gross: f64) -> Vec<PairMatches> {
+pub(super) fn matched(truth: &[Camera], noise_px: f64, gross: f64) -> Vec<PairMatches> {
     let context = StageContext::default();
     let mut pairs = Vec::new();
     for a in 0..truth.len() {
@@ -150,17 +150,17 @@ fn a_zoom_of_one_photograph_is_noticed() {
 }
 
 /// Cameras with this lens, and the principal point off center.
-fn bent(cameras: Vec<Camera>, radial: [f64; 4], off: [f64; 2]) -> Vec<Camera> {
+pub(super) fn bent(cameras: Vec<Camera>, radial: [f64; 4], off: [f64; 2]) -> Vec<Camera> {
     let lens = Lens::new(LensTerms { radial, ..LensTerms::default() });
     let principal_point = [WIDTH / 2.0 + off[0], HEIGHT / 2.0 + off[1]];
     cameras.into_iter().map(|camera| Camera { lens, principal_point, ..camera }).collect()
 }
 
-fn row(rolls: [f64; 8]) -> Vec<Camera> {
+pub(super) fn row(rolls: [f64; 8]) -> Vec<Camera> {
     (0..8).map(|k| camera(650.0, 20.0 * k as f64, 2.0 * (k % 3) as f64, rolls[k])).collect()
 }
 
-const ROLLS: [f64; 8] = [3.0, -5.0, 1.0, 7.0, -2.0, 4.0, -6.0, 2.0];
+pub(super) const ROLLS: [f64; 8] = [3.0, -5.0, 1.0, 7.0, -2.0, 4.0, -6.0, 2.0];
 
 /// The corners are 500 px from the middle; the lens moves them by 500 (500 / 650)^2 0.08 = 24 px.
 #[test]
