@@ -185,8 +185,7 @@ impl<'a> FocalSearch<'a> {
         Ok(Candidate { log_factor, parameters, improbable })
     }
 
-    /// Cameras near `nearby` with focal lengths at a factor of this logarithm: with longer ones photographs lie less far apart, and what bends
-    /// them as far counts for more.
+    /// Where refinement starts from at a factor of this logarithm: with longer focal lengths than `nearby` photographs are turned less far apart.
     fn stretched(&self, nearby: &Parameters, log_factor: f64) -> Parameters {
         let focal_px: Vec<f64> = self.found.focal_px.iter().map(|focal_px| focal_px * log_factor.exp()).collect();
         let by: Vec<f64> = focal_px.iter().zip(&nearby.focal_px).map(|(to, from)| to / from).collect();

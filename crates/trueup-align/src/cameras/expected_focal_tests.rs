@@ -149,6 +149,35 @@ fn what_metadata_say_may_be_wrong_altogether() {
     assert!((tailed(1e-3) - 1e-3).abs() < 1e-6 && tailed(0.0) == 0.0);
 }
 
+/// Photographs from one place whose features are a little worse than most: the recorded focal length, 40 % too long, is not even asked.
+#[test]
+fn sure_matches_are_left_alone() {
+    let truth = row(ROLLS)[..4].to_vec();
+    let priors = [CameraPrior { focal_px: Some(910.0), ..CameraPrior::unknown(FRAME, 0) }; 4];
+    let pairs = matched(&truth, 0.6, 0.0);
+    let observations = Observations::choose(&priors, &pairs.iter().collect::<Vec<_>>(), MATCHES_PER_PAIR);
+    let problem = BundleAdjustment {
+        priors: &priors,
+        observations: &observations,
+        curves: &CurveObservations::default(),
+        start_focal_px: vec![650.0; 4],
+        reference: 0,
+        focal_sd: vec![1.0; 4],
+    };
+    let start = Parameters {
+        focal_px: vec![650.0; 4],
+        rotations: truth.iter().map(|camera| camera.rotation() * truth[0].rotation().transpose()).collect(),
+        lenses: vec![LensState::default(); 4],
+    };
+    let (context, shared, options) =
+        (StageContext::default(), IntrinsicsModel::shared(&priors), CameraOptions::default());
+    let found = problem.minimize(start, &shared, FINE_HUBER_PX, &context).expect("solvable");
+    let expectation = Expectation::of(&priors, &found, &options);
+    assert!(FocalSearch::new(&problem, &found, &shared, &expectation, &context).is_some(), "worse than features");
+    let asked = expected(&problem, &found, &shared, &[], &options, &context).expect("solvable");
+    assert!(asked.is_none());
+}
+
 /// Three photographs through a lens that bends, twice as far off as features: 8 % aside of the focal length, another lens makes their matches meet
 /// better than the same one.
 #[test]
