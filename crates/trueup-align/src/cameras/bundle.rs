@@ -258,6 +258,11 @@ impl BundleAdjustment<'_> {
         costs.iter().sum()
     }
 
+    /// What matches and edges cost in the final pass, without what holds single unknowns.
+    pub(super) fn fine_costs(&self, parameters: &Parameters) -> [f64; 2] {
+        [self.matches_cost(parameters, FINE_HUBER_PX), self.curves_cost(parameters, FINE_HUBER_PX)]
+    }
+
     /// The sum of squares that is minimized.
     fn cost<const LOCAL: usize>(&self, parameters: &Parameters, model: &IntrinsicsModel, huber_px: f64) -> f64 {
         let prior: f64 = self.pulls(parameters, model).iter().map(|pull| pull.residual * pull.residual).sum();

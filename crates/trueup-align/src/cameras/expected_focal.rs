@@ -151,7 +151,7 @@ impl<'a> FocalSearch<'a> {
     ) -> Option<Self> {
         let overlaps = problem.observations.pairs.len();
         let matches: usize = problem.observations.pairs.iter().map(|pair| pair.matches.len()).sum();
-        let costs = costs(problem, found);
+        let costs = problem.fine_costs(found);
         // Of both directions of every match.
         let mean_square = costs[0] / (2 * matches).max(1) as f64;
         if overlaps > MOST_OVERLAPS || mean_square.sqrt() <= FEATURE_ERROR_PX {
@@ -179,7 +179,7 @@ impl<'a> FocalSearch<'a> {
         self.context.check_cancelled()?;
         let start = self.stretched(nearby, log_factor);
         let parameters = self.problem.minimize_until(SETTLED, start, &self.model, FINE_HUBER_PX, self.context)?;
-        let costs = costs(self.problem, &parameters);
+        let costs = self.problem.fine_costs(&parameters);
         let told = (0..costs.len()).filter(|&by| self.costs[by] > 0.0);
         let improbable = told.map(|by| self.independent[by] * (costs[by] / self.costs[by]).ln()).sum();
         Ok(Candidate { log_factor, parameters, improbable })
@@ -213,11 +213,6 @@ impl<'a> FocalSearch<'a> {
 /// What this many standard deviations squared make improbable of a witness that may be wrong altogether: as a bell does where they are few.
 fn tailed(square: f64) -> f64 {
     ERRORS_OF_WITNESS * (square / ERRORS_OF_WITNESS).ln_1p()
-}
-
-/// What matches and edges cost.
-fn costs(problem: &BundleAdjustment<'_>, at: &Parameters) -> [f64; 2] {
-    [problem.matches_cost(at, FINE_HUBER_PX), problem.curves_cost(at, FINE_HUBER_PX)]
 }
 
 /// What lines tell through the cameras of `candidates`, ordered by their focal lengths.

@@ -119,7 +119,7 @@ impl LensSearch<'_> {
         asked: &[bool],
     ) -> Result<Vec<bool>> {
         let (problem, terms) = (self.problem, BLOCKS[0]);
-        let by_pinholes = self.costs(parameters);
+        let by_pinholes = problem.fine_costs(parameters);
         let at = |parameters: &Parameters, free: &[FreeTerms], of: &[bool], huber_px: f64| {
             self.told(problem, parameters, group_of, free, &Ask { terms, of, huber_px })
         };
@@ -138,7 +138,8 @@ impl LensSearch<'_> {
             let coarse = problem.minimize(parameters.clone(), &model, COARSE_HUBER_PX, self.context)?;
             let fine = problem.minimize(coarse, &model, FINE_HUBER_PX, self.context)?;
             let again = at(&fine, &wished, &bent, FINE_HUBER_PX).by_either();
-            let denied = self.costs(&fine).iter().zip(by_pinholes).any(|(after, before)| *after > DENIED * before);
+            let denied =
+                problem.fine_costs(&fine).iter().zip(by_pinholes).any(|(after, before)| *after > DENIED * before);
             let is_still = |group: usize| {
                 self.is_visible(&fine, group_of, group)
                     && (first.by_matches[group] || (again[group] && !(only_edges && denied)))
@@ -160,12 +161,6 @@ impl LensSearch<'_> {
         group_of.iter().position(|&of| of == group).is_some_and(|member| {
             self.corner_shift(parameters, member, parameters.lenses[member].term(RADIAL)) > LEAST_SHIFT_PX
         })
-    }
-
-    /// What matches and edges cost.
-    fn costs(&self, parameters: &Parameters) -> [f64; 2] {
-        let problem = self.problem;
-        [problem.matches_cost(parameters, FINE_HUBER_PX), problem.curves_cost(parameters, FINE_HUBER_PX)]
     }
 
     /// For every group who tells of the terms beside those that are free.

@@ -104,11 +104,11 @@ pub(super) fn refine(
         }
     }
     // A lens that bends may make focal lengths seem to differ; a zoom is seen beside it, too.
+    let cost = |at: &Parameters| problem.fine_costs(at).iter().sum::<f64>();
     let explains_more = |lens: &FoundLenses| {
         let is_zoomed =
             || unshared.as_ref().is_some_and(|own| zoom::fits_far_better(&problem, &shared, &lens.parameters, own));
-        !per_picture_focal
-            || cost_without_pulls(&problem, &lens.parameters) < cost_without_pulls(&problem, &fine) && !is_zoomed()
+        !per_picture_focal || cost(&lens.parameters) < cost(&fine) && !is_zoomed()
     };
     let end = End { problem: &problem, for_lenses: &for_lenses, lines: input.lines, options, context };
     if let Some(FoundLenses { parameters, model }) = with_lens.filter(explains_more) {
@@ -166,11 +166,6 @@ impl End<'_> {
         let by_matches = Some(ByMatches { parameters, opened });
         Ok(Refined { by_matches, ..Refined::of(sharp, per_picture_focal) })
     }
-}
-
-/// What matches and edges alone cost.
-fn cost_without_pulls(problem: &BundleAdjustment<'_>, parameters: &Parameters) -> f64 {
-    problem.matches_cost(parameters, FINE_HUBER_PX) + problem.curves_cost(parameters, FINE_HUBER_PX)
 }
 
 /// The rotations refined from `start` with all focal lengths fixed to those that are expected.

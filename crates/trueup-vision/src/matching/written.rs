@@ -62,6 +62,9 @@ pub(super) fn without_written(
     // Of equals the first.
     let most = |most: Vec<bool>, one: Vec<bool>| if count(&one) > count(&most) { one } else { most };
     let on_writing = Writing::all(frames).into_iter().map(held).reduce(most).unwrap_or_default();
+    if !on_writing.contains(&true) {
+        return putative;
+    }
     let of_writing = putative.iter().zip(&on_writing).filter(|(_, is_held)| **is_held);
     let written: BTreeSet<[i64; 2]> = of_writing.map(|(one, _)| square(one.at.in_a)).collect();
     let featured: BTreeSet<[i64; 2]> = a.points.iter().map(|point| square(point.position)).collect();
