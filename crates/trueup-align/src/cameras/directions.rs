@@ -22,7 +22,7 @@ use crate::straightening::{PITCH_PRIOR, straighten_with_pitch};
 use crate::vanishing::InterpretationPlanes;
 use crate::vanishing::frame_search::{GUIDING_SIGNIFICANCE, search_frames};
 use crate::vanishing::jackknife::{deviation_of, sectors};
-use crate::vanishing::joint::LineVote;
+use crate::vanishing::joint::{AxisWeights, LineVote};
 
 /// Fewer sectors with lines tell nothing of how they scatter.
 const FEWEST_SECTORS: usize = 3;
@@ -65,7 +65,7 @@ impl BestFrame {
 
     /// The one near that of another focal length.
     fn followed(vote: &LineVote, from: &Self) -> Self {
-        let frame = vote.refine_frame(&from.frame, &[1.0; 3]);
+        let frame = vote.refine_frame(&from.frame, &AxisWeights::new(0, 1.0, 1.0));
         Self { frame, fit: vote.fit(&frame), significance: None }
     }
 }

@@ -9,7 +9,7 @@ use super::tests::{missing, with_lines};
 use crate::vanishing::InterpretationPlanes;
 use crate::vanishing::frame_search::GUIDING_SIGNIFICANCE;
 use crate::vanishing::jackknife::{self, covariance_by_photographs};
-use crate::vanishing::joint::{LineVote, Refinement};
+use crate::vanishing::joint::{AxisWeights, LineVote, Refinement};
 
 fn max(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
@@ -112,8 +112,9 @@ fn photographs_that_contradict_each_other_leave_the_vertical_uncertain() {
         let vote = LineVote::new(&rotations, (0..rotations.len()).map(planes).collect());
         // The true frame in the cameras' world.
         let frame = rotations[0].transpose() * scene.world_from_camera[0].transpose();
-        let start = vote.refine_frame(&frame, &[1.0; 3]);
-        let refinement = Refinement { start: &start, axes_used: 3, axis_weights: &[1.0; 3] };
+        let weights = AxisWeights::new(1, 1.0, 1.0);
+        let start = vote.refine_frame(&frame, &weights);
+        let refinement = Refinement { start: &start, axes_used: 3, axis_weights: weights };
         jackknife::deviation(&covariance_by_photographs(&vote, refinement, 1))
     };
     let agreed = deviation(&scene);

@@ -89,7 +89,7 @@ pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRol
         return None;
     }
     let UprightScene { frame, vertical, axes_used, axis_weights, .. } = &scene;
-    let refinement = Refinement { start: frame, axes_used: *axes_used, axis_weights };
+    let refinement = Refinement { start: frame, axes_used: *axes_used, axis_weights: *axis_weights };
     let scatter = |frames: Vec<Matrix3<f64>>, fewest: usize| {
         AxisScatter::of(&frames, *vertical).filter(|scatter| scatter.groups >= fewest)
     };
@@ -139,7 +139,7 @@ impl UprightScene {
             frame: level,
             vertical: 0,
             axes_used: 1,
-            axis_weights: [1.0, 0.0, 0.0],
+            axis_weights: AxisWeights::new(0, 1.0, 0.0),
             spread: None,
         };
         match (&prior.guidance.dominant, prior.guidance.used) {

@@ -27,7 +27,7 @@ fn scene(seed: u64) -> SyntheticScene {
 fn true_rolls_lie_within_the_intervals_as_often_as_these_say() {
     for method in [PriorMethod::VanishingPoints, PriorMethod::Straightening] {
         let (mut holding, mut stated, mut widths) = (0_u32, 0_u32, 0.0);
-        for seed in 0..24 {
+        for seed in 0..96 {
             let scene = scene(seed);
             let found = rolls(&scene, method).expect("vertical lines in every photograph");
             for (roll, truth) in found.iter().zip(&scene.roll) {

@@ -260,10 +260,16 @@ impl<'a> SceneDirections<'a> {
             axis_weights = self::axis_weights(&start, &self.vertical(&start), guidance);
         }
         let frame = if joint { self.refined(&start, &axis_weights) } else { start };
-        let mut down = self.vertical(&frame);
+        let of_frame = self.vertical(&frame);
+        let mut down = asked.map_or(of_frame, |found| {
+            let told = if found.is_narrow { found.upright } else { found.vertical };
+            // It is on the side of the frame's column, which may be up.
+            told * told.dot(&of_frame).signum()
+        });
+        let frame = turn_between(&of_frame, &down) * frame;
         if joint {
             let vertical = column_near(&frame, &down);
-            let refinement = Refinement { start: &frame, axes_used: 3, axis_weights: &axis_weights };
+            let refinement = Refinement { start: &frame, axes_used: 3, axis_weights };
             let mut covariance = self.covariance(refinement, vertical, asked.as_ref(), guidance.pooled);
             // Where upright lines are not heard beside the level ones, nothing tells whether these slope.
             if reconciled.is_none() && horizontal_agreement(guidance) > 0.0 {
@@ -395,7 +401,7 @@ impl<'a> SceneDirections<'a> {
         }
         let (first, second) = orthonormal_complement(&peak.down);
         let frame = Matrix3::from_columns(&[peak.down, first, second]);
-        let refinement = Refinement { start: &frame, axes_used: 1, axis_weights: &[1.0; 3] };
+        let refinement = Refinement { start: &frame, axes_used: 1, axis_weights: AxisWeights::new(0, 1.0, 0.0) };
         let covariance = self.covariance(refinement, 0, None, false);
         let refused = guidance.clone();
         let Ok(down) = self.weighed(&peak.down, &covariance, guidance) else {
@@ -477,8 +483,7 @@ fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix3<f64> {
 /// vertical.
 pub(super) fn axis_weights(frame: &Matrix3<f64>, down: &Vector3<f64>, guidance: &Guidance) -> AxisWeights {
     let horizontal = if guidance.slope.is_some() { 0.0 } else { horizontal_agreement(guidance) };
-    let vertical = column_near(frame, down);
-    std::array::from_fn(|axis| if axis == vertical { 1.0 } else { horizontal })
+    AxisWeights::new(column_near(frame, down), 1.0, horizontal)
 }
 
 /// How far photographs agree on the horizontal directions, from 0 to 1.

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use trueup_core::geometry::orthonormal_complement;
 
-use super::joint::LineVote;
+use super::joint::{AxisWeights, LineVote};
 
 /// How far from the cameras' own vertical the segments' is sought, degrees.
 pub(crate) const SEARCH_DEG: f64 = 25.0;
@@ -53,7 +53,7 @@ impl PooledFrames {
     /// it is known by. `None` without any.
     pub(crate) fn refined(&self, vote: &LineVote) -> Option<Matrix3<f64>> {
         let refine = |start: &Matrix3<f64>| {
-            let frame = vote.refine_frame(start, &[1.0; 3]);
+            let frame = vote.refine_frame(start, &AxisWeights::new(0, 1.0, 1.0));
             (frame, vote.fit(&frame))
         };
         let refined: Vec<(Matrix3<f64>, f64)> = self.starts.par_iter().map(refine).collect();

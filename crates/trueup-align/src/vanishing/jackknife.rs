@@ -15,10 +15,9 @@ const FEW_GROUPS: f64 = 0.66;
 /// A covariance has the shape that so many more groups would give it that scatter alike all round. Reasoned: the two axes of a vertical, a group each.
 const SHAPELESS_GROUPS: f64 = 2.0;
 
-/// Standard deviation, about any level axis, of what all lines of a scene err by alike, degrees. Fitted on 100 photographs of rendered rooms, whose level
-/// is exact (which need none), and 267 cut from panoramas: the smallest hundredth with which the 95 % interval holds the truth of 95 % of either.
-/// docs/quality.md has the coverage on others.
-pub(crate) const SCENE_DEVIATION_DEG: f64 = 0.02;
+/// Standard deviation, about any level axis, of what all lines of a scene err by alike, degrees. Fitted on 276 photographs cut from panoramas: the smallest
+/// hundredth with which the 95 % interval holds the truth of 95 % of them. docs/quality.md has the coverage on others.
+pub(crate) const SCENE_DEVIATION_DEG: f64 = 0.04;
 /// Width of a sector of the scene, degrees of longitude: a facade, seen from where its lines can be told apart.
 const SECTOR_DEG: f64 = 20.0;
 /// Fewer sectors with lines tell nothing of how they scatter.

@@ -8,10 +8,11 @@
 //! it is v . c / (2 |f v_xy - m v_z|), exactly; behind a lens that bends, what [`InterpretationPlanes::reach`] has in place
 //! of the divisor.
 
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::geometry::{exp_rotation, nearest_rotation, orthonormal_complement};
 
 use super::interpretation::InterpretationPlanes;
+use super::supporters::{BUILT_DEVIATION_DEG, EXPECTED_SCATTER_PX, Supporter, weigh_as_things};
 
 /// Scale of the robust loss at which the refinement starts, working pixels.
 const START_SCALE_PX: f64 = 4.0;
@@ -23,13 +24,44 @@ pub(crate) const TOLERANCE_DEG: f64 = 3.0;
 const ITERATIONS_PER_SCALE: usize = 4;
 /// Factor between successive scales.
 const SHRINK: f64 = 0.7;
-/// Damping in px^2 per rad^2 and segment: keeps an axis without segments where it is.
+/// Damping in rad^-2: keeps an axis without segments where it is.
 const DAMPING: f64 = 1e-6;
 /// Rounds of iterations at the last scale that a refinement by some of the segments takes from the full one's result.
 const REPEATS: usize = 3;
 
-/// Factors on the weights of the segments of each axis (column) of a frame.
-pub(crate) type AxisWeights = [f64; 3];
+/// Factors on the weights of the segments of a frame's axes (columns).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct AxisWeights {
+    /// The axis of what stands upright.
+    vertical: usize,
+    /// The factor of its segments.
+    upright: f64,
+    /// That of the others'.
+    level: f64,
+}
+
+impl AxisWeights {
+    /// `upright` on the segments along the axis `vertical`, `level` on the others.
+    pub(crate) fn new(vertical: usize, upright: f64, level: f64) -> Self {
+        Self { vertical, upright, level }
+    }
+
+    /// The factor of an axis.
+    pub(crate) fn of(&self, axis: usize) -> f64 {
+        if axis == self.vertical { self.upright } else { self.level }
+    }
+
+    /// What the segments along an axis tell of the frame's turns, from the normal matrix in rad^-2 and the gradient in rad^-1 that they have.
+    ///
+    /// Level lines of a facade or a street are parallel to each other, and all of them may be out of level or of the right angle to others; what they
+    /// err by together, no number of them tells.
+    fn told(&self, axis: usize, matrix: &Matrix3<f64>, gradient: &Vector3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
+        let together = if axis == self.vertical { 0.0 } else { BUILT_DEVIATION_DEG.to_radians().powi(2) };
+        // (matrix^-1 + together)^-1, also of a matrix that tells nothing of a turn about the axis.
+        let shared = (Matrix3::identity() + matrix * together).try_inverse().unwrap_or_default() * self.of(axis);
+        (matrix * shared, shared * gradient)
+    }
+}
 
 /// A segment: its photograph and its place among the usable ones there.
 #[derive(Debug, Clone, Copy)]
@@ -44,22 +76,7 @@ pub(crate) struct Refinement<'a> {
     pub start: &'a Matrix3<f64>,
     /// Axes that segments may support: the first so many columns.
     pub axes_used: usize,
-    pub axis_weights: &'a AxisWeights,
-}
-
-/// A segment that supports an axis of a frame.
-#[derive(Debug, Clone, Copy)]
-struct Supporter {
-    /// The axis: a column of the frame.
-    axis: usize,
-    /// [`InterpretationPlanes::moments`], in the common frame.
-    moment: Vector3<f64>,
-    /// axis . moment / reach: how far the axis misses the segment, in pixels at the segment.
-    residual_px: f64,
-    /// The segment's weight times that of the robust loss.
-    weight: f64,
-    /// See [`InterpretationPlanes::reach`].
-    reach: f64,
+    pub axis_weights: AxisWeights,
 }
 
 /// The axis that a segment fits best, as in [`Supporter`].
@@ -131,7 +148,7 @@ impl LineVote {
     /// Refines a frame (columns are directions in the common frame) over SO(3); `axis_weights` multiply the weights of
     /// the segments of each axis.
     pub(crate) fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
-        self.refine(Refinement { start, axes_used: 3, axis_weights }, scales(), |_| true)
+        self.refine(Refinement { start, axes_used: 3, axis_weights: *axis_weights }, scales(), |_| true)
     }
 
     /// How well segments fit a frame: the sum of their weights, each times 1 / (1 + (r / s)^2) of its residual r, with s the last scale of the loss, whose
@@ -142,7 +159,7 @@ impl LineVote {
 
     /// The same of each segment, by photograph, where each photograph's own segments turn the frame for it.
     pub(crate) fn fits_of_own(&self, frame: &Matrix3<f64>) -> Vec<Vec<f64>> {
-        let refinement = Refinement { start: frame, axes_used: 3, axis_weights: &[1.0; 3] };
+        let refinement = Refinement { start: frame, axes_used: 3, axis_weights: AxisWeights::new(0, 1.0, 1.0) };
         let of_photograph = |(index, photograph): (usize, &PhotographLines)| {
             let own = self.refine(refinement, scales(), |one| one.photograph == index);
             photograph.fits(&own).collect()
@@ -202,16 +219,24 @@ impl LineVote {
         asked: impl Fn(SegmentPlace) -> bool,
     ) -> Matrix3<f64> {
         let Refinement { start, axes_used, axis_weights } = refinement;
+        let unit = 1.0 / (self.mean_weight() * EXPECTED_SCATTER_PX.powi(2));
         let mut frame = *start;
         for scale in scales {
             for _ in 0..ITERATIONS_PER_SCALE {
-                let (mut matrix, mut gradient) = (Matrix3::identity() * DAMPING, Vector3::zeros());
-                self.for_each_supporter(&frame, axes_used, scale, &asked, |one| {
+                let mut axes = [(Matrix3::zeros(), Vector3::zeros()); 3];
+                for one in self.weighed_supporters(&frame, axes_used, scale, &asked) {
                     let jacobian = Vector3::ith(one.axis, 1.0).cross(&frame.tr_mul(&one.moment)) / one.reach;
-                    let weight = one.weight * axis_weights[one.axis];
-                    matrix += jacobian * jacobian.transpose() * weight;
-                    gradient += jacobian * (weight * one.residual_px);
-                });
+                    let weight = one.weight * unit;
+                    let (matrix, gradient) = &mut axes[one.axis];
+                    *matrix += jacobian * jacobian.transpose() * weight;
+                    *gradient += jacobian * (weight * one.residual_px);
+                }
+                let (mut matrix, mut gradient) = (Matrix3::identity() * DAMPING, Vector3::zeros());
+                for (axis, (of_axis, toward)) in axes.iter().enumerate() {
+                    let (of_axis, toward) = axis_weights.told(axis, of_axis, toward);
+                    matrix += of_axis;
+                    gradient += toward;
+                }
                 let Some(inverse) = matrix.try_inverse() else { return frame };
                 let step: Vector3<f64> = -(inverse * gradient);
                 frame = nearest_rotation(&(frame * exp_rotation(&step)));
@@ -222,7 +247,7 @@ impl LineVote {
 
     /// The frame whose first column alone is refined: the direction that segments near it point to.
     pub(crate) fn refine_first_axis(&self, start: &Matrix3<f64>) -> Matrix3<f64> {
-        self.refine(Refinement { start, axes_used: 1, axis_weights: &[1.0; 3] }, scales(), |_| true)
+        self.refine(Refinement { start, axes_used: 1, axis_weights: AxisWeights::new(0, 1.0, 0.0) }, scales(), |_| true)
     }
 
     /// Normal matrix and gradient, in px^2 per rad^2 and px^2 per rad, of the squared residuals of photograph `index`
@@ -247,7 +272,7 @@ impl LineVote {
             |_| true,
             |one| {
                 let jacobian = frame.column(one.axis).cross(&one.moment) / one.reach;
-                let weight = one.weight * axis_weights[one.axis] / mean;
+                let weight = one.weight * axis_weights.of(one.axis) / mean;
                 matrix += jacobian * jacobian.transpose() * weight;
                 gradient += jacobian * (weight * one.residual_px);
             },
@@ -255,47 +280,28 @@ impl LineVote {
         (matrix, gradient)
     }
 
-    /// Refines one direction of the common frame alone, over the sphere.
+    /// The direction of the common frame that segments near `start` point to.
     pub(crate) fn refine_direction(&self, start: &Vector3<f64>) -> Vector3<f64> {
-        let mut direction = *start;
-        for scale in scales() {
-            for _ in 0..ITERATIONS_PER_SCALE {
-                let (first, second) = orthonormal_complement(&direction);
-                let frame = Matrix3::from_columns(&[direction, first, second]);
-                let (mut matrix, mut gradient) = (Matrix2::identity() * DAMPING, Vector2::zeros());
-                self.for_each_supporter(
-                    &frame,
-                    1,
-                    scale,
-                    |_| true,
-                    |one| {
-                        let jacobian = Vector2::new(first.dot(&one.moment), second.dot(&one.moment)) / one.reach;
-                        matrix += jacobian * jacobian.transpose() * one.weight;
-                        gradient += jacobian * (one.weight * one.residual_px);
-                    },
-                );
-                let Some(inverse) = matrix.try_inverse() else { return direction };
-                let step: Vector2<f64> = -(inverse * gradient);
-                direction = (direction + first * step.x + second * step.y).normalize();
-            }
-        }
-        direction
+        let (first, second) = orthonormal_complement(start);
+        self.refine_first_axis(&Matrix3::from_columns(&[*start, first, second])).column(0).into_owned()
     }
 
-    /// Calls `visit` for every segment `asked` that supports one of the first `axes_used` axes of
-    /// `frame`.
-    fn for_each_supporter(
+    /// Every segment `asked` that supports one of the first `axes_used` axes of `frame`, weighed as the thing that it is a piece of.
+    fn weighed_supporters(
         &self,
         frame: &Matrix3<f64>,
         axes_used: usize,
         scale: f64,
         asked: impl Fn(SegmentPlace) -> bool,
-        mut visit: impl FnMut(Supporter),
-    ) {
+    ) -> Vec<Supporter> {
+        let mut supporters = Vec::new();
         for (index, photograph) in self.photographs.iter().enumerate() {
             let asked = |line| asked(SegmentPlace { photograph: index, line });
-            photograph.for_each_supporter(&photograph.rotation, frame, axes_used, scale, asked, &mut visit);
+            let keep = |one| supporters.push(one);
+            photograph.for_each_supporter(&photograph.rotation, frame, axes_used, scale, asked, keep);
         }
+        weigh_as_things(&mut supporters, frame, scale / END_SCALE_PX);
+        supporters
     }
 
     /// How strongly the segments support `direction`.
@@ -337,7 +343,7 @@ impl PhotographLines {
         })
     }
 
-    /// [`LineVote::for_each_supporter`] of one photograph, for a camera of this rotation.
+    /// Calls `visit` for every segment `asked` that supports one of the first `axes_used` axes of `frame`, for a camera of this rotation.
     fn for_each_supporter(
         &self,
         rotation: &Matrix3<f64>,
@@ -358,7 +364,8 @@ impl PhotographLines {
             let robust = 1.0 / (1.0 + (residual_px / scale).powi(2)).powi(2);
             let moment = rotation.tr_mul(&self.planes.moments[line]);
             let weight = self.planes.weights[line] * robust;
-            visit(Supporter { axis, moment, residual_px, weight, reach });
+            let half_length = 0.5 * self.planes.lengths[line];
+            visit(Supporter { axis, moment, residual_px, half_length, weight, reach });
         }
     }
 

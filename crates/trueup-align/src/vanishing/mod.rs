@@ -16,6 +16,7 @@ pub(crate) mod joint;
 mod options;
 mod refine;
 mod search;
+pub(crate) mod supporters;
 mod triad;
 mod uncalibrated;
 
