@@ -117,7 +117,7 @@ pub(super) fn corrected_rotations(
     certainties: &[RelativeCertainty],
     vote: &LineVote,
     frame: &Matrix3<f64>,
-    axis_weights: &AxisWeights,
+    axis_weights: AxisWeights,
 ) -> Vec<Matrix3<f64>> {
     let mut turns = vec![Vector3::<f64>::zeros(); rotations.len()];
     let line_information = LINE_ERROR_PX.powi(-2);
@@ -150,7 +150,7 @@ pub(super) fn turn_covariances(
     certainties: &[RelativeCertainty],
     vote: &LineVote,
     frame: &Matrix3<f64>,
-    axis_weights: &AxisWeights,
+    axis_weights: AxisWeights,
 ) -> Option<Vec<Matrix3<f64>>> {
     let scale = scales().last()?;
     let normal = |(index, rotation): (usize, &Matrix3<f64>)| {

@@ -102,7 +102,7 @@ pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRol
         false => vec![mean_scatter(by_sectors, others)],
     };
     let certainties = relative_certainties(&scene.cameras(input), input.edges);
-    let turns = turn_covariances(&scene.rotations, &certainties, &vote, frame, axis_weights)?;
+    let turns = turn_covariances(&scene.rotations, &certainties, &vote, frame, *axis_weights)?;
     let estimate = |(rotation, turn): (&Matrix3<f64>, &Matrix3<f64>)| {
         let estimates = scatters.iter().filter_map(|scatter| estimated_roll(scatter, &down, rotation, turn));
         estimates.max_by(|one, other| one.within.total_cmp(&other.within))
@@ -165,7 +165,7 @@ impl UprightScene {
             return None;
         }
         let certainties = relative_certainties(&self.cameras(input), input.edges);
-        let rotations = corrected_rotations(&self.rotations, &certainties, &vote, &frame, &self.axis_weights);
+        let rotations = corrected_rotations(&self.rotations, &certainties, &vote, &frame, self.axis_weights);
         Some(Self { rotations, frame, ..self })
     }
 

@@ -259,7 +259,7 @@ impl<'a> SceneDirections<'a> {
             start = turn_between(&start.column(column_near(&start, &upright)).into_owned(), &upright) * start;
             axis_weights = self::axis_weights(&start, &self.vertical(&start), guidance);
         }
-        let frame = if joint { self.refined(&start, &axis_weights) } else { start };
+        let frame = if joint { self.refined(&start, axis_weights) } else { start };
         let of_frame = self.vertical(&frame);
         let mut down = asked.map_or(of_frame, |found| {
             let told = if found.is_narrow { found.upright } else { found.vertical };
@@ -281,7 +281,7 @@ impl<'a> SceneDirections<'a> {
         guidance.dominant = Some(rows_of(&(turn_between(&self.vertical(&frame), &down) * frame)));
         guidance.used = true;
         let rotations = match joint && self.options.camera_correction {
-            true => self.corrected(&frame, &axis_weights),
+            true => self.corrected(&frame, axis_weights),
             false => self.level.rotations.to_vec(),
         };
         let own =
@@ -376,13 +376,13 @@ impl<'a> SceneDirections<'a> {
         reconciled(&self.vote, frame, vertical, horizontal_agreement(guidance))
     }
 
-    fn corrected(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> Vec<Matrix3<f64>> {
+    fn corrected(&self, frame: &Matrix3<f64>, axis_weights: AxisWeights) -> Vec<Matrix3<f64>> {
         let certainties = relative_certainties(self.input.cameras, self.input.edges);
         corrected_rotations(self.level.rotations, &certainties, &self.vote, frame, axis_weights)
     }
 
     /// The frame that all segments vote for, unless it left the neighborhood of the photographs' own.
-    fn refined(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
+    fn refined(&self, frame: &Matrix3<f64>, axis_weights: AxisWeights) -> Matrix3<f64> {
         let refined = self.vote.refine_frame(frame, axis_weights);
         let limit = MAX_REFINEMENT_TOLERANCES * joint::TOLERANCE_DEG.to_radians();
         let (before, after) = (self.vertical(frame), self.vertical(&refined));

@@ -76,7 +76,7 @@ pub(super) fn reconciled(vote: &LineVote, frame: &Matrix3<f64>, vertical: usize,
         return None;
     }
     let level_weights = AxisWeights::new(vertical, 0.0, 1.0);
-    let level_frame = vote.refine_frame(frame, &level_weights);
+    let level_frame = vote.refine_frame(frame, level_weights);
     let level: Vector3<f64> = level_frame.column(vertical).into_owned();
     let tangent = Matrix3x2::from_columns(&[first, second]);
     let upright_refinement =

@@ -53,7 +53,7 @@ impl PooledFrames {
     /// it is known by. `None` without any.
     pub(crate) fn refined(&self, vote: &LineVote) -> Option<Matrix3<f64>> {
         let refine = |start: &Matrix3<f64>| {
-            let frame = vote.refine_frame(start, &AxisWeights::new(0, 1.0, 1.0));
+            let frame = vote.refine_frame(start, AxisWeights::new(0, 1.0, 1.0));
             (frame, vote.fit(&frame))
         };
         let refined: Vec<(Matrix3<f64>, f64)> = self.starts.par_iter().map(refine).collect();

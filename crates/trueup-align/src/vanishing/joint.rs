@@ -147,8 +147,8 @@ impl LineVote {
 
     /// Refines a frame (columns are directions in the common frame) over SO(3); `axis_weights` multiply the weights of
     /// the segments of each axis.
-    pub(crate) fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
-        self.refine(Refinement { start, axes_used: 3, axis_weights: *axis_weights }, scales(), |_| true)
+    pub(crate) fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: AxisWeights) -> Matrix3<f64> {
+        self.refine(Refinement { start, axes_used: 3, axis_weights }, scales(), |_| true)
     }
 
     /// How well segments fit a frame: the sum of their weights, each times 1 / (1 + (r / s)^2) of its residual r, with s the last scale of the loss, whose
@@ -258,7 +258,7 @@ impl LineVote {
         index: usize,
         rotation: &Matrix3<f64>,
         frame: &Matrix3<f64>,
-        axis_weights: &AxisWeights,
+        axis_weights: AxisWeights,
         scale: f64,
     ) -> (Matrix3<f64>, Vector3<f64>) {
         let (mut matrix, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
