@@ -20,8 +20,10 @@ const START_SCALE_PX: f64 = 4.0;
 const END_SCALE_PX: f64 = 0.5;
 /// Largest angle between a segment and a direction for the segment to vote, degrees.
 pub(crate) const TOLERANCE_DEG: f64 = 3.0;
-/// Iterations at each scale of the loss.
+/// Most iterations at each scale of the loss.
 const ITERATIONS_PER_SCALE: usize = 4;
+/// Step in radians below which the frame has settled at a scale: a thousandth of what verticals are known to.
+const SETTLED: f64 = 1e-6;
 /// Factor between successive scales.
 const SHRINK: f64 = 0.7;
 /// Damping in rad^-2: keeps an axis without segments where it is.
@@ -240,6 +242,9 @@ impl LineVote {
                 let Some(inverse) = matrix.try_inverse() else { return frame };
                 let step: Vector3<f64> = -(inverse * gradient);
                 frame = nearest_rotation(&(frame * exp_rotation(&step)));
+                if step.norm() < SETTLED {
+                    break;
+                }
             }
         }
         frame
