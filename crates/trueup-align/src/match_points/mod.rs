@@ -145,7 +145,8 @@ impl Transfer<'_> {
     ///
     /// The noise of matches has nothing in common: photographs taken from one point keep the cameras' consistency. Where the
     /// cameras are wrong and the matches far, nothing is known: a vertex is carried if the matches around it count for
-    /// [`FIXING_MATCHES`] times the share of what they say.
+    /// [`FIXING_MATCHES`] times the share of what they say, and no farther from where the cameras have it than any match lies from there: what
+    /// goes beyond all matches was not told by them.
     fn by_cameras_and_matches(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<Vector2<f64>>> {
         let cameras = CameraResidual::new(self.cameras, self.source, self.target);
         let by_cameras = (0..grid.len()).map(|vertex| cameras.at(grid.source(vertex)));
@@ -155,10 +156,12 @@ impl Transfer<'_> {
         }
         // Where the matches determine no homography the cameras alone must do.
         let by_matches = self.by_matches(frame);
+        let farthest = cameras.largest_deviation();
         let mean = |(vertex, camera): (usize, Option<Vector2<f64>>)| {
             let (at, camera) = (grid.source(vertex), camera?);
             let is_told = moving_dlt::are_told_around(self.source, at, FIXING_MATCHES * share);
-            is_told.then(|| by_matches(at).map_or(camera, |matches| camera.lerp(&matches, share)))
+            let told = is_told.then(|| by_matches(at).map_or(camera, |matches| camera.lerp(&matches, share)));
+            told.filter(|told| (told - camera).norm() <= farthest)
         };
         by_cameras.enumerate().map(mean).collect()
     }

@@ -109,6 +109,11 @@ impl<'a> CameraResidual<'a> {
         self.common_square
     }
 
+    /// Farthest that any match deviates from the cameras, pixels.
+    pub(super) fn largest_deviation(&self) -> f64 {
+        self.samples.iter().map(|sample| sample.deviation.norm()).fold(0.0, f64::max)
+    }
+
     fn correction(&self, point: Vector2<f64>) -> Vector2<f64> {
         /// Rounds of reweighting.
         const ROUNDS: usize = 3;

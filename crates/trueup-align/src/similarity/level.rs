@@ -4,6 +4,8 @@
 //! covariance; the vertical is the direction of least summed squares, each in units of its own deviation, so that none is
 //! believed altogether or not at all.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use trueup_core::geometry::tangent_basis;
@@ -30,6 +32,8 @@ const HELD_SCALE: f64 = 2.0;
 const MAX_HORIZON_DEVIATIONS: f64 = 4.0;
 /// Least standard deviation of a vertical, radians: what directions in double precision tell apart. A jackknife over lines that leave a frame where it is finds none.
 const LEAST_DEVIATION: f64 = 1.5e-8;
+/// Least share of the information at which lines that do not guide are said to take part.
+const LEAST_SHARE: f64 = 0.05;
 /// Steps toward the vertical of least squares. Where the cameras' level is far off, it takes several to do without it.
 const STEPS: usize = 20;
 
@@ -234,6 +238,24 @@ impl<'a> CameraLevel<'a> {
         if self.says.iter().any(contradicts) { self.without_horizon() } else { self.clone() }
     }
 
+    /// What told of the vertical `down`, which has the covariance `covariance` about its tangents, rad^2, with lines in `photographs` photographs: the lines first, by what the
+    /// other sources leave of the information. `None` where that is less than [`LEAST_SHARE`].
+    pub(super) fn evidence_beside_lines(
+        &self,
+        down: &Vector3<f64>,
+        covariance: &Matrix2<f64>,
+        photographs: usize,
+    ) -> Option<Vec<LevelEvidence>> {
+        let heeded: Vec<Say> = self.says.iter().map(|say| say.heeded(down)).collect();
+        let mut left = (covariance.try_inverse()? - information(&heeded, down)).symmetric_eigen();
+        // What was known to a quarter turn was not known.
+        left.eigenvalues.apply(|value| *value = value.max(FRAC_PI_2.powi(-2)));
+        let lines = Say::seen(LevelSource::Lines, photographs, *down, &left.recompose());
+        let says: Vec<Say> = std::iter::once(lines).chain(self.says.iter().copied()).collect();
+        let evidence = evidence(&says, down);
+        evidence.first().is_some_and(|lines| lines.share >= LEAST_SHARE).then_some(evidence)
+    }
+
     /// The vertical with what lines in `photographs` photographs say of it, whose covariance is `covariance`, rad^2, weighed in; and
     /// what told of it, the lines first.
     pub(super) fn with_lines(
@@ -316,7 +338,7 @@ mod tests {
 
     /// Four cameras that look in all directions, rolled by turns to the left and to the right.
     fn all_round(roll: f64) -> Vec<Matrix3<f64>> {
-        let turn = |quarter: i32| rotation_about_y(f64::from(quarter) * std::f64::consts::FRAC_PI_2);
+        let turn = |quarter: i32| rotation_about_y(f64::from(quarter) * FRAC_PI_2);
         (0..4).map(|quarter| rotation_about_z(if quarter % 2 == 0 { roll } else { -roll }) * turn(quarter)).collect()
     }
 
@@ -383,7 +405,7 @@ mod tests {
     #[test]
     fn gravity_outweighs_how_cameras_are_held() {
         let rotations: Vec<Matrix3<f64>> =
-            all_round(0.0).iter().map(|rotation| rotation_about_z(std::f64::consts::FRAC_PI_2) * rotation).collect();
+            all_round(0.0).iter().map(|rotation| rotation_about_z(FRAC_PI_2) * rotation).collect();
         let level = CameraLevel::new(&rotations, PITCH_PRIOR, gravity(Vector3::y(), 0.02));
         assert!(level.down.angle(&Vector3::y()) < 1e-3, "{}", level.down);
         let shares: Vec<f64> = level.evidence().iter().map(|one| one.share).collect();
@@ -394,7 +416,7 @@ mod tests {
     /// keeps its sense.
     #[test]
     fn lines_are_not_stood_on_their_head() {
-        let rolls = [0.0, std::f64::consts::FRAC_PI_2, 0.0];
+        let rolls = [0.0, FRAC_PI_2, 0.0];
         let rotations: Vec<Matrix3<f64>> = rolls
             .iter()
             .zip([-0.5, 0.0, 0.5])
@@ -411,7 +433,7 @@ mod tests {
     #[test]
     fn who_turns_a_camera_on_purpose_does_not_tilt_the_level() {
         let views = [-0.4, 0.4, 0.0].map(|yaw| rotation_about_x(0.05) * rotation_about_y(yaw));
-        let on_its_side = rotation_about_z(std::f64::consts::FRAC_PI_2) * views[2];
+        let on_its_side = rotation_about_z(FRAC_PI_2) * views[2];
         let level = |rotations: &[Matrix3<f64>]| CameraLevel::new(rotations, PITCH_PRIOR, None).down;
         let turned = level(&[views[0], views[1], on_its_side]);
         assert!(turned.angle(&level(&views[..2])) < 1e-12, "{turned}");

@@ -21,6 +21,7 @@ mod path_voting;
 mod posterior;
 mod printed;
 mod prior;
+mod probable_vertical;
 mod scale;
 mod signed_permutation;
 mod turn_equations;

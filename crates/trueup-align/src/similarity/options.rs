@@ -89,8 +89,9 @@ trueup_core::options! {
         /// the photographs agree on, and in their place where they do not agree. Turn it off to keep to the published
         /// method.
         pooled_search: bool = true, Allowed::Any, "";
-        /// Whether a vertical alone may guide where the horizontal directions do not agree. Turn it off where what
-        /// looks vertical is not, as leaning trees or masts.
+        /// Whether a vertical alone may guide where the horizontal directions do not agree, and whether a few upright
+        /// lines that may not guide tell of the level beside what else does. Turn it off where what looks vertical is not, as leaning trees or
+        /// masts.
         vertical_only: bool = true, Allowed::Any, "";
         /// Whether gravity that cameras recorded takes part in the vertical. Turn it off where a camera was tilted on purpose, or its
         /// sensor is wrong.

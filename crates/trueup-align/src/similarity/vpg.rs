@@ -10,9 +10,10 @@ use super::dominant::{Dominant, dominant_frame};
 use super::gate::{GateEvidence, allowed_divergence, allowed_of_level_lines, divergence, failed_clause};
 use super::held::held_roll;
 use super::input::PriorInput;
-use super::level::CameraLevel;
+use super::level::{CameraLevel, LevelSource};
 use super::options::{GateMode, SimilarityOptions};
 use super::prior::{Guidance, VerticalSpread};
+use super::probable_vertical::{ProbableVertical, probable_vertical};
 use super::signed_permutation::{match_triad, triad_residual};
 use super::turns::{RollEvidence, solve_turns};
 use super::upright::Upright;
@@ -116,6 +117,9 @@ pub(super) fn guide(
         }
     }
     let upright = scene.vertical_alone(&mut guidance);
+    if upright.is_none() && !guidance.level.iter().any(|told| told.source == LevelSource::Lines) {
+        down = scene.probable_vertical(&mut guidance).unwrap_or(down);
+    }
     Ok(Guided { guidance, upright, level: down })
 }
 
@@ -412,6 +416,17 @@ impl<'a> SceneDirections<'a> {
         guidance.vertical_only = true;
         let own = common_rolls(&down, self.level.rotations);
         Some(self.solve(&down, &own, self.level.rotations.to_vec(), guidance))
+    }
+
+    /// The mean vertical of segments that do not guide and of what else is known, if they tell anything of it.
+    fn probable_vertical(&self, guidance: &mut Guidance) -> Option<Vector3<f64>> {
+        if !self.options.vertical_only {
+            return None;
+        }
+        let ProbableVertical { down, covariance } = probable_vertical(&self.vote, self.level)?;
+        guidance.level =
+            self.level.evidence_beside_lines(&down, &covariance, self.vote.photographs_along(&down).max(1))?;
+        Some(down)
     }
 
     /// Searches photographs that disagree, or have no triad, again near the dominant directions.

@@ -142,6 +142,14 @@ impl InterpretationPlanes {
         }
     }
 
+    /// Unit direction of a segment's middle in the camera frame.
+    pub(crate) fn toward(&self, line: usize) -> Vector3<f64> {
+        match &self.middle_rays {
+            None => self.midpoints[line].push(self.focal_px).normalize(),
+            Some(rays) => rays[line],
+        }
+    }
+
     /// Number of usable segments.
     pub(crate) fn len(&self) -> usize {
         self.normals.len()

@@ -72,6 +72,17 @@ pub(crate) struct SegmentPlace {
     pub line: usize,
 }
 
+/// A segment as seen in the common frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sight {
+    /// Unit normal of its interpretation plane.
+    pub normal: Vector3<f64>,
+    /// Unit direction of its middle.
+    pub toward: Vector3<f64>,
+    /// Length in working pixels.
+    pub length_px: f64,
+}
+
 /// A refinement of a frame over its turns.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Refinement<'a> {
@@ -133,6 +144,21 @@ impl LineVote {
                 .zip(&photograph.planes.weights)
                 .map(|(normal, &weight)| (photograph.rotation.tr_mul(normal), weight))
                 .collect()
+        };
+        self.photographs.iter().flat_map(of_photograph).collect()
+    }
+
+    /// About `most` segments as seen in the common frame, the longest of every photograph.
+    pub(crate) fn sights(&self, most: usize) -> Vec<Sight> {
+        let of_each = most.div_ceil(self.photographs.len().max(1));
+        let of_photograph = |photograph: &PhotographLines| -> Vec<Sight> {
+            let PhotographLines { rotation, planes } = photograph;
+            let sight = |line: usize| Sight {
+                normal: rotation.tr_mul(&planes.normals[line]),
+                toward: rotation.tr_mul(&planes.toward(line)),
+                length_px: planes.lengths[line],
+            };
+            (0..planes.len().min(of_each)).map(sight).collect()
         };
         self.photographs.iter().flat_map(of_photograph).collect()
     }

@@ -219,6 +219,8 @@ pub struct LevelRecord {
 impl LevelRecord {
     /// Smallest share that is worth a word.
     const WORTH_NAMING: f64 = 0.005;
+    /// Deviation from which an angle is as good as not known, degrees.
+    const UNKNOWN_DEG: f64 = 45.0;
 
     fn in_words(&self) -> String {
         let who = match self.source {
@@ -229,7 +231,11 @@ impl LevelRecord {
         };
         // Up to the next tenth: what is sure to less is not told so surely.
         let deviation_deg = (10.0 * self.deviation_deg).ceil() / 10.0;
-        format!("{who} {:.0} % (to {deviation_deg:.1} degrees)", 100.0 * self.share)
+        let how_sure = match self.deviation_deg < Self::UNKNOWN_DEG {
+            true => format!("to {deviation_deg:.1} degrees"),
+            false => "one of its two angles".to_owned(),
+        };
+        format!("{who} {:.0} % ({how_sure})", 100.0 * self.share)
     }
 }
 
