@@ -424,8 +424,12 @@ impl<'a> SceneDirections<'a> {
             return None;
         }
         let ProbableVertical { down, covariance } = probable_vertical(&self.vote, self.level)?;
-        guidance.level =
-            self.level.evidence_beside_lines(&down, &covariance, self.vote.photographs_along(&down).max(1))?;
+        // What a single photograph shows, or scattered rocks, is chance as often as not.
+        let photographs = self.vote.photographs_along(&down);
+        if photographs < MIN_UPRIGHT_PHOTOGRAPHS {
+            return None;
+        }
+        guidance.level = self.level.evidence_beside_lines(&down, &covariance, photographs)?;
         Some(down)
     }
 
