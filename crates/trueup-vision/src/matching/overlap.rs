@@ -35,26 +35,44 @@ impl<'a> PredictedOverlap<'a> {
 
     /// Where a point of a is in b; `None` if it is not in the overlap.
     pub(super) fn point_in_b(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
-        match &self.maps {
-            Maps::Homographies { b_from_a, .. } => visible(b_from_a, point, self.frame_b),
-            Maps::Turn(turned) => turned.in_b(point).filter(|at| self.frame_b.contains(at.x, at.y)),
-        }
+        self.b_from_a(point).filter(|at| self.frame_b.contains(at.x, at.y))
     }
 
     /// Where a point of b is in a; `None` if it is not in the overlap.
     pub(super) fn point_in_a(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
+        self.a_from_b(point).filter(|at| self.frame_a.contains(at.x, at.y))
+    }
+
+    /// Where a point of a is in b's picture, however far that reaches; `None` of what lies behind it.
+    fn b_from_a(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
         match &self.maps {
-            Maps::Homographies { a_from_b, .. } => visible(a_from_b, point, self.frame_a),
-            Maps::Turn(turned) => turned.in_a(point).filter(|at| self.frame_a.contains(at.x, at.y)),
+            Maps::Homographies { b_from_a, .. } => in_front(b_from_a, point),
+            Maps::Turn(turned) => turned.in_b(point),
         }
     }
 
-    /// The share of a that b shows, by `side` x `side` places spread evenly over it.
-    pub(crate) fn share_of_a(&self, side: usize) -> f64 {
-        let place = |cell: usize, length: f64| (cell as f64 + 0.5) / side as f64 * length;
-        let places = (0..side * side)
-            .map(|cell| Vector2::new(place(cell % side, self.frame_a.width), place(cell / side, self.frame_a.height)));
-        places.filter(|&at| self.point_in_b(at).is_some()).count() as f64 / (side * side) as f64
+    /// The same the other way.
+    fn a_from_b(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
+        match &self.maps {
+            Maps::Homographies { a_from_b, .. } => in_front(a_from_b, point),
+            Maps::Turn(turned) => turned.in_a(point),
+        }
+    }
+
+    /// The share of one photograph that the other shows, of that of which it is more, by `side` x `side` places spread evenly over each, from border to border. What lies
+    /// beyond the other by up to `margin` of its sides counts as shown.
+    pub(crate) fn larger_share(&self, side: usize, margin: f64) -> f64 {
+        let share = |frame: &WorkingFrame, other: &WorkingFrame, map: &dyn Fn(Vector2<f64>) -> Option<Vector2<f64>>| {
+            let place = |cell: usize, length: f64| cell as f64 / (side - 1) as f64 * length;
+            let is_near = |at: f64, length: f64| (-margin * length..=(1.0 + margin) * length).contains(&at);
+            let is_shown = |cell: &usize| {
+                let at = Vector2::new(place(cell % side, frame.width), place(cell / side, frame.height));
+                map(at).is_some_and(|at| is_near(at.x, other.width) && is_near(at.y, other.height))
+            };
+            (0..side * side).filter(is_shown).count() as f64 / (side * side) as f64
+        };
+        let of_a = share(self.frame_a, self.frame_b, &|point| self.b_from_a(point));
+        of_a.max(share(self.frame_b, self.frame_a, &|point| self.a_from_b(point)))
     }
 
     /// Whether both ends of a match lie in the overlap.
@@ -95,10 +113,8 @@ impl<'a> PredictedOverlap<'a> {
     }
 }
 
-fn visible(target_from_source: &Homography, point: Vector2<f64>, target: &WorkingFrame) -> Option<Vector2<f64>> {
-    let in_front = target_from_source.denominator(point) > 0.0;
-    let mapped = target_from_source.apply(point);
-    (in_front && target.contains(mapped.x, mapped.y)).then_some(mapped)
+fn in_front(target_from_source: &Homography, point: Vector2<f64>) -> Option<Vector2<f64>> {
+    (target_from_source.denominator(point) > 0.0).then(|| target_from_source.apply(point))
 }
 
 /// The part of a convex polygon where `line` (x, y, 1) is not negative (one step of Sutherland and Hodgman).
@@ -148,7 +164,20 @@ mod tests {
         assert!(overlap.is_plausible(1.5));
         assert_eq!(overlap.point_in_b(Vector2::new(500.0, 10.0)), Some(Vector2::new(100.0, 10.0)));
         assert_eq!(overlap.point_in_b(Vector2::new(300.0, 10.0)), None);
-        assert_eq!(overlap.share_of_a(8), 0.5);
+        assert_eq!(overlap.larger_share(8, 0.0), 0.5);
+        // A tenth of 800 pixels more is most of the next of eight columns.
+        assert_eq!(overlap.larger_share(8, 0.1), 0.625);
+    }
+
+    /// A photograph drawn half as large in the middle of another one is shown wholly, which itself is shown to a quarter.
+    #[test]
+    fn the_larger_share_is_that_of_the_narrower_photograph() {
+        let frame = frame();
+        let zoomed = Homography(Matrix3::new(0.5, 0.0, 200.0, 0.0, 0.5, 150.0, 0.0, 0.0, 1.0));
+        for b_from_a in [zoomed, zoomed.inverse().expect("regular")] {
+            let overlap = PredictedOverlap::new(b_from_a, &frame, &frame).expect("regular");
+            assert_eq!(overlap.larger_share(10, 0.0), 1.0);
+        }
     }
 
     #[test]

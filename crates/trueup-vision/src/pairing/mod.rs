@@ -26,7 +26,7 @@ use growth::VerifiedOverlaps;
 pub use likeness::{Likeness, likeness};
 
 /// Overlaps of a photograph, in multiples of `pairing.neighbors`, from which no more are looked for: they tell nothing new.
-const PARTNERS_PER_NEIGHBOR: usize = 4;
+const PARTNERS_PER_NEIGHBOR: usize = 6;
 /// Pairs tried to join what is apart, at most, as a part of those that all photographs propose of their neighbors.
 const JOINING_SHARE: f64 = 0.5;
 
@@ -35,10 +35,10 @@ trueup_core::options! {
     pub struct PairingOptions("pairing") {
         /// All pairs are matched of at most so many photographs; of more, those that look alike, and those that overlaps found
         /// predict. Raise it if photographs that overlap are left out of a large panorama: the time grows with the square.
-        exhaustive_up_to: usize = 40, between(0.0, 100000.0), "photographs", basic;
-        /// For every photograph, the neighbors proposed by their looks; up to four times as many are found from there. Raise it
+        exhaustive_up_to: usize = 8, between(0.0, 100000.0), "photographs", basic;
+        /// For every photograph, the neighbors proposed by their looks; up to six times as many are found from there. Raise it
         /// for photographs of many rows, each of which overlaps many others.
-        neighbors: usize = 8, between(1.0, 1000.0), "photographs";
+        neighbors: usize = 5, between(1.0, 1000.0), "photographs";
         /// Whether photographs that follow one another are proposed whatever they look like. Turn it off if their order
         /// says nothing of where they were taken.
         consecutive: bool = true, Allowed::Any, "";
@@ -52,8 +52,8 @@ trueup_core::options! {
 /// others, "Building Rome in a day", 2009, section 4.2: query expansion).
 ///
 /// # Departures
-/// Brown and Lowe take the 6 neighbors with most matches; we take 8, as the trees miss some, propose consecutive photographs, which
-/// photographers overlap, and let overlaps found predict others.
+/// Brown and Lowe take the 6 neighbors with most matches; we take 5 to begin with, propose consecutive photographs, which photographers overlap, and let
+/// overlaps found predict the others.
 #[derive(Debug)]
 pub struct Proposals<'a> {
     frames: &'a [WorkingFrame],
