@@ -136,19 +136,26 @@ pub(super) fn halved(picture: &Raster<f32>) -> Raster<f32> {
     half
 }
 
-/// How much brighter the one exposure is, in stops: the median over places that are neither black nor white in the darker one. Where
-/// the brighter one is clipped it is more than that.
+/// Share of the picture in which neither exposure may be black or white for their stops to be those of these places alone: as much as must tell of a view.
+const LEAST_IN_BOTH: f64 = 0.02;
+
+/// How much brighter the one exposure is, in stops: the median over places that are neither black nor white in either, if there are enough of
+/// them, for what is white says less than it is: at the bright end of a bracket, that of a third of a stop would be a tenth. Otherwise it is that of
+/// places that are neither in the darker one, and is more than that where the brighter one is clipped.
 pub(super) fn stops_between(dark: &Raster<f32>, bright: &[f32]) -> Option<f64> {
     let light: Vec<f64> = (0..=255).map(|level| TransferCurve::SRGB.linear(f64::from(level) / 255.0)).collect();
     // Levels are within 0 to 255; the cast saturates.
     let stops =
         |dark: f32, bright: f32| (light[(bright + 0.5) as u8 as usize] / light[(dark + 0.5) as u8 as usize]).log2();
-    let mut all: Vec<f64> = dark
-        .data()
-        .iter()
-        .zip(bright)
-        .filter(|(dark, bright)| **dark > CRUSHED && **dark < CLIPPED && **bright > CRUSHED)
-        .map(|(&dark, &bright)| stops(dark, bright))
-        .collect();
-    median(&mut all)
+    let below = |most_bright: f32| -> Vec<f64> {
+        let is_told = |&(dark, bright): &(&f32, &f32)| {
+            *dark > CRUSHED && *dark < CLIPPED && *bright > CRUSHED && *bright < most_bright
+        };
+        dark.data().iter().zip(bright).filter(is_told).map(|(&dark, &bright)| stops(dark, bright)).collect()
+    };
+    let mut in_both = below(CLIPPED);
+    if in_both.len() as f64 >= LEAST_IN_BOTH * dark.data().len() as f64 {
+        return median(&mut in_both);
+    }
+    median(&mut below(f32::INFINITY))
 }

@@ -6,6 +6,10 @@
 //! within the overlap, at shifts that are not searched. What cameras recorded of their exposures has a voice: of one exposure there is no stack,
 //! however the pictures differ, and where both say the same, less of a picture must tell.
 //!
+//! Steps of a bracket may be small: a third of a stop is less than an automatic exposure changes, or an editor. What tells a bracket from two photographs
+//! of one view, or a photograph and its copy, is that a record says so, or that exposures of the run are farther apart; those between
+//! then belong to it, however near, as long as none comes twice.
+//!
 //! # Source
 //! Debevec and Malik, "Recovering high dynamic range radiance maps from photographs", SIGGRAPH 1997, for what a bracket is; Ward, "Fast,
 //! robust image registration for compositing high dynamic range photographs from handheld exposures", Journal of Graphics Tools 8(2), 2003,
@@ -31,14 +35,16 @@ use trueup_core::raster::Raster;
 pub use alignment::{AlignedMember, MemberPair, Unaligned, align};
 use likeness::{CLIPPED, CRUSHED, gray};
 pub use limits::LEAST_STOPS;
+use limits::{LEAST_RANGE, LEAST_STEP, MOST_SHIFT, ONE_EXPOSURE, SAME_RECORD};
 use same_view::{SameView, SmallCopy, same_view};
 
 /// A photograph is compared with so many that follow it: cameras take the darkest and the brightest of a bracket one after the other, which
 /// have next to nothing in common, but the one before or after them has something of both.
 const LOOK_AHEAD: usize = 3;
 
-/// Most photographs in a stack: what cameras take of one view at most.
-const MOST_MEMBERS: usize = 9;
+/// Most photographs of a stack that are fused: cameras take nine at most, and sixteen a stop apart range over more than any scene does. Fusing holds all
+/// of them in memory, and takes as much longer as there are more.
+const MOST_MEMBERS: usize = 16;
 
 trueup_core::choice! {
     /// Which photographs are fused.
@@ -81,6 +87,8 @@ pub struct FoundStack {
     pub reference: usize,
     /// The others, in their order.
     pub others: Vec<FoundMember>,
+    /// What need not be fused, in their order: exposures that lie closest between others of a stack that has more than enough.
+    pub spare: Vec<FoundMember>,
 }
 
 /// A photograph of a stack beside its reference.
@@ -172,20 +180,43 @@ fn stacks_of(
     let mut stacks: Vec<Vec<FoundMember>> = Vec::new();
     for member in run {
         match stacks.last_mut() {
-            Some(stack)
-                if stack.len() < MOST_MEMBERS
-                    && stack.iter().all(|other| (other.stops - member.stops).abs() >= LEAST_STOPS) =>
-            {
-                stack.push(*member);
+            Some(stack) if stack.iter().all(|other| may_share_a_stack(other, member, candidates)) => {
+                stack.push(*member)
             }
             _ => stacks.push(vec![*member]),
         }
     }
-    let is_joined = |stack: &Vec<FoundMember>| {
-        let numbers: Vec<usize> = stack.iter().map(|member| member.photograph).collect();
-        stack.len() > 1 && same.keys().any(|(a, b)| numbers.contains(a) && numbers.contains(b))
+    stacks
+        .into_iter()
+        .filter(|stack| is_bracket(stack, same))
+        .filter_map(|stack| with_reference(&stack, candidates))
+        .collect()
+}
+
+/// Whether two photographs of one view are two exposures, and near enough to lie on each other.
+fn may_share_a_stack(one: &FoundMember, other: &FoundMember, candidates: &[StackCandidate]) -> bool {
+    let recorded = [one, other].map(|member| candidates[member.photograph].recorded_stops);
+    let recorded = recorded[0].zip(recorded[1]).map(|(one, other)| (one - other).abs());
+    let are_two = match recorded {
+        Some(stops) if stops <= SAME_RECORD => false,
+        Some(stops) if stops >= ONE_EXPOSURE => true,
+        _ => (one.stops - other.stops).abs() >= LEAST_STEP,
     };
-    stacks.into_iter().filter(is_joined).filter_map(|stack| with_reference(&stack, candidates)).collect()
+    // Links of less than that, one after the other, may lead along a row of photographs.
+    let longer_from_width = candidates[one.photograph]
+        .thumbnail
+        .map_or(1.0, |small| small.width() as f64 / small.width().max(small.height()) as f64);
+    let [x, y] = [0, 1].map(|axis| (one.shift[axis] - other.shift[axis]) * longer_from_width);
+    are_two && x.hypot(y) <= 2.0 * MOST_SHIFT
+}
+
+/// Whether what may be one stack shows itself as exposures of one view: two of them are a bracket already, or all of them range far enough.
+fn is_bracket(stack: &[FoundMember], same: &BTreeMap<(usize, usize), SameView>) -> bool {
+    let is_of_it = |number: usize| stack.iter().any(|member| member.photograph == number);
+    let within = |&(&(a, b), _): &(&(usize, usize), &SameView)| is_of_it(a) && is_of_it(b);
+    let stops = || stack.iter().map(|member| member.stops);
+    let range = stops().fold(f64::NEG_INFINITY, f64::max) - stops().fold(f64::INFINITY, f64::min);
+    same.iter().filter(within).any(|(_, view)| view.is_bracket || range >= LEAST_RANGE)
 }
 
 /// The stack seen from the member that tells most: least of it is clipped or crushed; of equals the first.
@@ -200,6 +231,26 @@ fn with_reference(stack: &[FoundMember], candidates: &[StackCandidate]) -> Optio
         shift: [0, 1].map(|axis| member.shift[axis] - reference.shift[axis]),
         ..*member
     };
-    let others = stack.iter().filter(|member| member.photograph != reference.photograph).map(seen).collect();
-    Some(FoundStack { reference: reference.photograph, others })
+    let spare = spare(stack, reference.photograph);
+    let (spare, others): (Vec<FoundMember>, Vec<FoundMember>) = stack
+        .iter()
+        .filter(|member| member.photograph != reference.photograph)
+        .map(seen)
+        .partition(|member| spare.contains(&member.photograph));
+    Some(FoundStack { reference: reference.photograph, others, spare })
+}
+
+/// The numbers of what a stack of more than [`MOST_MEMBERS`] can do without: one after the other the exposure, not the reference, the darkest or the brightest,
+/// that leaves the smallest gap.
+fn spare(stack: &[FoundMember], reference: usize) -> Vec<usize> {
+    let mut kept: Vec<&FoundMember> = stack.iter().collect();
+    kept.sort_by(|one, other| one.stops.total_cmp(&other.stops));
+    let mut spare = Vec::new();
+    while kept.len() > MOST_MEMBERS {
+        let gap = |place: &usize| kept[place + 1].stops - kept[place - 1].stops;
+        let inner = (1..kept.len() - 1).filter(|&place| kept[place].photograph != reference);
+        let Some(least) = inner.min_by(|one, other| gap(one).total_cmp(&gap(other))) else { break };
+        spare.push(kept.remove(least).photograph);
+    }
+    spare
 }

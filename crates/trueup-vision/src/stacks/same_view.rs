@@ -3,7 +3,7 @@
 use trueup_core::raster::Raster;
 
 use super::likeness::{Likeness, expected, gray, halved, likeness, stops_between};
-use super::limits::{LEAST_STOPS, MOST_SHIFT};
+use super::limits::{LEAST_STEP, LEAST_STOPS, MOST_SHIFT, ONE_EXPOSURE};
 
 /// Longest side, in pixels, of the copies that the search begins with.
 const COARSEST_PX: usize = 64;
@@ -18,13 +18,17 @@ const LEAST_AGREEING_TILES: f64 = 0.6;
 /// How much brighter, in the mean of its levels, one of two exposures that are far enough apart is at least: half a stop is a factor of 1.17 on
 /// the levels of all places that neither loses. Most photographs that follow one another are told apart by that alone.
 const LEAST_BRIGHTER: f64 = 1.05;
+/// The same of two that were recorded as two exposures: a third of a stop is a factor of 1.11, and of the brightest of a bracket most is white.
+const LEAST_BRIGHTER_RECORDED: f64 = 1.02;
+/// Or so much less dark, in the mean of what its levels lack of white: where most is white, a stop more adds next to nothing to the mean.
+const LEAST_LESS_DARK: f64 = 1.1;
+/// White, in levels.
+const WHITE: f64 = 255.0;
 /// Share of the picture in which both must tell something.
 const LEAST_TOLD: f64 = 0.02;
 
 /// The same where cameras recorded as many stops as the pictures tell: of the brightest of a bracket next to nothing may be left.
 const LEAST_TOLD_RECORDED: f64 = 0.005;
-/// Recorded exposures that differ by less, in stops, are one: what differs between the pictures was made later, or is of the light.
-const ONE_EXPOSURE: f64 = 0.2;
 /// Recorded and seen stops agree if they differ by no more than this ...
 const AGREEING_STOPS: f64 = 1.0;
 /// ... and this part of the recorded ones: the curve of a camera is not known.
@@ -64,6 +68,8 @@ pub(super) struct SameView {
     pub(super) shift: [f64; 2],
     /// Correlation of their details.
     pub(super) correlation: f64,
+    /// Whether the two are a bracket by themselves: far enough apart, or recorded as two exposures. Others only join such ones.
+    pub(super) is_bracket: bool,
 }
 
 impl SameView {
@@ -74,14 +80,20 @@ impl SameView {
 }
 
 /// `None` if `a` and `b`, of one size, do not show the same view, or at the same exposure. `recorded` are the stops by which `b` took more light, if their
-/// cameras recorded it: what contradicts the pictures is none of a bracket.
+/// cameras recorded it: what contradicts the pictures is none of a bracket, and what differs where the record does not was made later, or is of the light.
+///
+/// Exposures that are nearer than half a stop, as cameras take them by half and third stops, count as well: as a bracket where the record says the same
+/// as the pictures, else as what may join exposures that are farther apart.
 pub(super) fn same_view(a: &SmallCopy, b: &SmallCopy, recorded: Option<f64>) -> Option<SameView> {
     if recorded.is_some_and(|stops| stops.abs() < ONE_EXPOSURE) {
         return None;
     }
     let b_is_bright = b.brightness >= a.brightness;
     let (dark, bright) = if b_is_bright { (a, b) } else { (b, a) };
-    if bright.brightness < LEAST_BRIGHTER * dark.brightness {
+    let least_brighter = if recorded.is_some() { LEAST_BRIGHTER_RECORDED } else { LEAST_BRIGHTER };
+    let is_brighter = bright.brightness >= least_brighter * dark.brightness
+        || WHITE - dark.brightness > LEAST_LESS_DARK * (WHITE - bright.brightness);
+    if !is_brighter {
         return None;
     }
     let coarsest = dark.levels.len().min(bright.levels.len()) - 1;
@@ -106,15 +118,25 @@ pub(super) fn same_view(a: &SmallCopy, b: &SmallCopy, recorded: Option<f64>) -> 
     let found = compared(dark, bright, best)?;
     let stops = stops_between(dark, &shifted(bright, best))?;
     let sign = if b_is_bright { 1.0 } else { -1.0 };
-    let is_agreed = |recorded: f64| (sign * stops - recorded).abs() <= AGREEING_STOPS + AGREEING_SHARE * recorded.abs();
-    let least_told = if recorded.is_some_and(is_agreed) { LEAST_TOLD_RECORDED } else { LEAST_TOLD };
-    let is_same =
-        found.correlation >= MAY_BE_SAME && found.agreeing_tiles >= LEAST_AGREEING_TILES && found.told >= least_told;
-    if !is_same || stops < LEAST_STOPS || !recorded.is_none_or(is_agreed) {
+    let is_far = stops >= LEAST_STOPS;
+    let is_agreed = |recorded: f64| {
+        let within_share = (sign * stops - recorded).abs() - AGREEING_SHARE * recorded.abs();
+        // Of less than half a stop, a whole one more or less would say nothing, not even which one is brighter.
+        within_share <= if is_far { AGREEING_STOPS } else { 0.0 }
+    };
+    let is_recorded = recorded.is_some_and(is_agreed);
+    let least_told = if is_recorded { LEAST_TOLD_RECORDED } else { LEAST_TOLD };
+    let is_bracket = is_far || is_recorded;
+    // What makes no bracket itself must be sure.
+    let least_correlation = if is_bracket { MAY_BE_SAME } else { SAME_VIEW };
+    let is_same = found.correlation >= least_correlation
+        && found.agreeing_tiles >= LEAST_AGREEING_TILES
+        && found.told >= least_told;
+    if !is_same || stops < LEAST_STEP || !(recorded.is_none() || is_recorded) {
         return None;
     }
     let shift = best.map(|pixels| sign * pixels as f64 / dark.width() as f64);
-    Some(SameView { stops: sign * stops, shift, correlation: found.correlation })
+    Some(SameView { stops: sign * stops, shift, correlation: found.correlation, is_bracket })
 }
 
 /// The picture without what a shift by half a pixel changes: by 1 2 1 along both sides.

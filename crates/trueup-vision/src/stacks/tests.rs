@@ -116,6 +116,96 @@ fn a_view_that_comes_back_after_another_is_no_stack_and_the_next_one_is() {
     assert!(matches!(numbers[..], [(2, 3) | (3, 2)]), "{numbers:?}");
 }
 
+/// The numbers of each stack's photographs, in their order, and of what it can spare.
+fn numbers(stacks: &[FoundStack]) -> Vec<(Vec<usize>, Vec<usize>)> {
+    let sorted = |stack: &FoundStack| {
+        let mut all: Vec<usize> = stack.others.iter().map(|one| one.photograph).chain([stack.reference]).collect();
+        all.sort_unstable();
+        (all, stack.spare.iter().map(|one| one.photograph).collect())
+    };
+    stacks.iter().map(sorted).collect()
+}
+
+/// Two directions at exposures that are so many stops from the middle, with what is recorded of them if it `is_recorded`.
+fn bracketed(stops: &[f64], is_recorded: bool) -> Vec<FoundStack> {
+    let shot = |k: usize| {
+        let [x, y, z] = HAND[k % HAND.len()];
+        let direction = DIRECTIONS[k / stops.len()];
+        thumbnail([x, y + direction, z], stops[k % stops.len()].exp2())
+    };
+    let thumbnails: Vec<Raster<u8>> = (0..2 * stops.len()).map(shot).collect();
+    let candidate = |(k, one)| StackCandidate {
+        thumbnail: Some(one),
+        camera: 0,
+        recorded_stops: is_recorded.then(|| 7.0 + stops[k % stops.len()]),
+    };
+    find(&thumbnails.iter().enumerate().map(candidate).collect::<Vec<_>>())
+}
+
+/// Every exposure nearer than half a stop to the one before it was the first of another stack, so that brackets of half and third stops were none.
+#[test]
+fn brackets_of_small_steps_are_stacks() {
+    let steps =
+        |count: usize, step: f64| -> Vec<f64> { (0..count).map(|k| (k as f64 - (count / 2) as f64) * step).collect() };
+    let third = 1.0 / 3.0;
+    let brackets = [
+        steps(5, 0.5),
+        steps(5, third),
+        // In the order of cameras.
+        vec![0.0, -third, third],
+        vec![0.0, -third, third, -2.0 * third, 2.0 * third],
+        steps(12, 0.5),
+        steps(9, 0.15),
+    ];
+    for stops in brackets {
+        for is_recorded in [false, true] {
+            let count = stops.len();
+            let expected = [0, count].map(|first| ((first..first + count).collect(), Vec::new()));
+            assert_eq!(numbers(&bracketed(&stops, is_recorded)), expected, "{stops:?} {is_recorded}");
+        }
+    }
+    // What makes a stack of two that are this near is the record alone.
+    assert_eq!(numbers(&bracketed(&[0.0, third], true)), [0, 2].map(|first| (vec![first, first + 1], Vec::new())));
+    assert!(bracketed(&[0.0, third], false).is_empty());
+}
+
+/// Thirty exposures of a view were four photographs of it.
+#[test]
+fn of_more_exposures_than_are_needed_the_closest_ones_are_spare() {
+    let stops: Vec<f64> = (0..20).map(|k| (f64::from(k) - 10.0) / 4.0).collect();
+    let stacks = bracketed(&stops, false);
+    assert_eq!(stacks.len(), 2, "{stacks:?}");
+    for (first, (fused, spare)) in [0, 20].into_iter().zip(numbers(&stacks)) {
+        assert_eq!((fused.len(), spare.len()), (MOST_MEMBERS, 20 - MOST_MEMBERS));
+        assert!(fused.contains(&first) && fused.contains(&(first + 19)), "the ends of the range: {fused:?}");
+        assert!(fused.windows(2).all(|pair| pair[1] - pair[0] <= 2), "no wide gap: {fused:?}");
+    }
+}
+
+/// A photograph and copies of it that were made a little brighter and darker, as with a camera's record so without, and one of them twice.
+#[test]
+fn copies_with_other_tones_are_no_stack() {
+    let copies = |exposures: &[f64], recorded: Option<f64>| {
+        let thumbnails: Vec<Raster<u8>> = exposures.iter().map(|&one| thumbnail([0.0; 3], one)).collect();
+        let candidate = |one| StackCandidate { thumbnail: Some(one), camera: 0, recorded_stops: recorded };
+        find(&thumbnails.iter().map(candidate).collect::<Vec<_>>()).len()
+    };
+    assert_eq!(copies(&[1.0, 1.25], None), 0);
+    assert_eq!(copies(&[1.0, 1.2, 0.9], None), 0);
+    assert_eq!(copies(&[1.0, 1.25, 1.25], None), 0);
+    assert_eq!(copies(&[1.0, 1.5, 0.5, 2.0], Some(7.0)), 0);
+}
+
+/// An edited copy has the record of its original, and is no third exposure beside a bracket.
+#[test]
+fn a_copy_of_an_exposure_is_none_of_the_stack() {
+    let thumbnails = [1.0, 4.0, 2.0].map(|exposure| thumbnail([0.0; 3], exposure));
+    let recorded = [7.0, 9.0, 7.0];
+    let candidate =
+        |k: usize| StackCandidate { thumbnail: Some(&thumbnails[k]), camera: 0, recorded_stops: Some(recorded[k]) };
+    assert_eq!(numbers(&find(&[0, 1, 2].map(candidate))), [(vec![0, 1], Vec::new())]);
+}
+
 /// Recorded exposures of 2 stops apart agree with pictures that are; one exposure, and one of the other sign, do not.
 #[test]
 fn what_cameras_recorded_has_a_voice() {

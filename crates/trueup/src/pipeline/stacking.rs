@@ -26,6 +26,9 @@ const STAGE: &str = "stacks";
 /// The code of an exposure that is in no panorama because it does not lie on the others of its stack.
 const NOT_ALIGNED: &str = "stack-member-not-aligned";
 
+/// The code of an exposure that is in no panorama because its stack has more than enough of them.
+const SPARE: &str = "stack-member-spare";
+
 /// What the phase works on.
 pub(super) struct StackingInput<'a> {
     /// The photographs as they were given, and what was told of them.
@@ -50,7 +53,14 @@ pub(super) struct Stacked {
 struct AlignedStack {
     reference: usize,
     members: Vec<(FoundMember, StackMember)>,
-    left_out: Vec<(FoundMember, Unaligned)>,
+    left_out: Vec<(FoundMember, LeftOut)>,
+}
+
+/// Why an exposure of a stack is not fused with it.
+#[derive(Debug, Clone, Copy)]
+enum LeftOut {
+    NotAligned(Unaligned),
+    Spare,
 }
 
 impl AlignedStack {
@@ -212,8 +222,9 @@ fn known_stacks(candidates: &[StackCandidate], keys: &[Option<Key>], memo: Memo)
     let content = candidates.iter().zip(keys).try_fold(KeyMaker::new(), of_one);
     let key = memo.key(STACKS, content, &());
     let is_among = |stack: &FoundStack| {
-        let numbers = stack.others.iter().map(|other| other.photograph).chain([stack.reference]);
-        numbers.into_iter().all(|number| number < candidates.len())
+        let others = stack.others.iter().chain(&stack.spare).map(|other| other.photograph);
+        let mut numbers = others.chain([stack.reference]);
+        numbers.all(|number| number < candidates.len())
     };
     let is_whole = |known: &Vec<FoundStack>| known.iter().all(is_among);
     memo.found_or_made(STACKS, key.as_ref(), is_whole, || Ok(stacks::find(candidates)))
@@ -238,7 +249,8 @@ fn aligned_stack(
     };
     let Some(reference) = gray(found.reference)? else { return Ok(None) };
     let focal_px = image.focal_prior.map(|prior| prior.focal_px * frame.working_from_full);
-    let (mut members, mut left_out) = (Vec::new(), Vec::new());
+    let mut members = Vec::new();
+    let mut left_out: Vec<(FoundMember, LeftOut)> = found.spare.iter().map(|&spare| (spare, LeftOut::Spare)).collect();
     for member in &found.others {
         let Some(gray) = gray(member.photograph)? else { return Ok(None) };
         let FoundMember { stops, shift, photograph, is_sure } = *member;
@@ -249,7 +261,7 @@ fn aligned_stack(
                 let full = in_full_pixels(&aligned.reference_from_member, frame.working_from_full);
                 members.push((*member, StackMember { source, reference_from_member: full.to_rows() }));
             }
-            Err(reason) if is_sure => left_out.push((*member, reason)),
+            Err(reason) if is_sure => left_out.push((*member, LeftOut::NotAligned(reason))),
             // It only looked like an exposure of this view, and stands for itself.
             Err(_) => {}
         }
@@ -292,7 +304,7 @@ fn stacked_set(
         images[stack.reference].stack = stack.members.iter().map(|(_, member)| member.clone()).collect();
         let reference = old.images[stack.reference].name.as_str();
         rejected.extend(
-            stack.left_out.iter().map(|(found, reason)| not_aligned(&old.images[found.photograph], reference, *reason)),
+            stack.left_out.iter().map(|(found, reason)| left_out(&old.images[found.photograph], reference, *reason)),
         );
     }
     let kept: Vec<usize> = (0..images.len()).filter(|&number| numbering.stays(number)).collect();
@@ -310,18 +322,21 @@ fn stacked_set(
     Ok((PhotographSet { lens_from: old.lens_from, ..set }, fused))
 }
 
-fn not_aligned(image: &SourceImage, reference: &str, reason: Unaligned) -> RejectedSource {
-    let why = match reason {
-        Unaligned::NoPicture => "it is too small to be aligned".to_owned(),
-        Unaligned::OtherDetails(correlation) => {
-            format!("its details are others once it is aligned (they correlate by {correlation:.2})")
+fn left_out(image: &SourceImage, reference: &str, reason: LeftOut) -> RejectedSource {
+    let (code, why) = match reason {
+        LeftOut::Spare => (SPARE, "those before and after it are enough".to_owned()),
+        LeftOut::NotAligned(Unaligned::NoPicture) => (NOT_ALIGNED, "it is too small to be aligned".to_owned()),
+        LeftOut::NotAligned(Unaligned::OtherDetails(correlation)) => {
+            (NOT_ALIGNED, format!("its details are others once it is aligned (they correlate by {correlation:.2})"))
         }
-        Unaligned::TooFar(share) => format!("it lies {:.0} % of a side away", 100.0 * share),
+        LeftOut::NotAligned(Unaligned::TooFar(share)) => {
+            (NOT_ALIGNED, format!("it lies {:.0} % of a side away", 100.0 * share))
+        }
     };
     RejectedSource {
         path: image.path.clone(),
         name: image.name.clone(),
-        code: NOT_ALIGNED.to_owned(),
+        code: code.to_owned(),
         reason: format!("it is an exposure of the stack of {reference}, but {why}"),
         hint: "Give --stacks none to have every photograph stitched by itself.".to_owned(),
     }
@@ -477,7 +492,7 @@ mod tests {
         let stack = AlignedStack {
             reference: 2,
             members: Vec::new(),
-            left_out: [1, 3].map(|k| (member(k), Unaligned::NoPicture)).into(),
+            left_out: [1, 3].map(|k| (member(k), LeftOut::NotAligned(Unaligned::NoPicture))).into(),
         };
         let numbering = Numbering::new(6, &[stack]);
         let new: Vec<usize> = (0..6).map(|number| numbering.new_of(number)).collect();
