@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::pictures::{HEIGHT, STREET_NAMES, WIDTH, jpeg, noise, plain, street_desk, street_pixels};
+use crate::pictures::{HEIGHT, STREET_NAMES, WIDTH, jpeg, noise, plain, street, street_desk, street_pixels};
 use crate::run::{Desk, FinishedRun, finish, trueup};
 
 /// A folder with the street's photographs, their panorama `pano.jpg` and its project `pano.json`.
@@ -373,4 +373,45 @@ fn projects_edited_to_nonsense_are_refused() {
         std::fs::remove_file(desk.join("edited.json")).expect("removed");
         assert_eq!(desk.files(), files, "{pointer}: nothing is left behind");
     }
+}
+
+/// Whatever is shown instead, what a panorama was stitched of is nobody's to write over.
+#[test]
+fn what_is_recorded_is_not_written_over() {
+    let desk = street_desk();
+    let mask = image::GrayImage::from_pixel(WIDTH as u32, HEIGHT as u32, image::Luma([255]));
+    mask.save(desk.join("m.png")).expect("written");
+    let masked = ["--mask", "b.jpg=m.png", "--project", "pano.json"];
+    desk.stitch(&[&STREET_NAMES[..], &masked].concat()).expect_success();
+    std::fs::create_dir(desk.join("shot")).expect("a folder");
+    for name in STREET_NAMES {
+        desk.put(&format!("shot/{name}"), desk.read(name));
+    }
+    let refused = |output: &str, more: &[&str], what: &str| {
+        let before = desk.read(output);
+        finish(trueup(desk.path(), &[&["compose", "pano.json", "-o", output], more].concat()))
+            .expect_failure(1, &[&format!("{output}: this file is one of the {what}")]);
+        assert!(desk.read(output) == before);
+    };
+    refused("m.png", &[], "masks");
+    refused("a.jpg", &[], "photographs");
+    refused("a.jpg", &["--photos", "shot"], "photographs");
+    refused("shot/a.jpg", &["--photos", "shot"], "photographs");
+}
+
+/// By their names alone nobody can tell photographs of one name in two folders apart.
+#[test]
+fn one_file_is_not_shown_in_two_places() {
+    let desk = Desk::new();
+    for (folder, photograph) in ["a", "b", "f", "moved"].iter().zip(street()) {
+        std::fs::create_dir(desk.join(folder)).expect("a folder");
+        desk.put(&format!("{folder}/1.jpg"), photograph);
+    }
+    desk.stitch(&["a", "b", "--project", "pano.json"]).expect_success();
+    let told = "1.jpg: it would stand for two photographs of the panorama, a/1.jpg and b/1.jpg";
+    compose(&desk, &["--photos", "f"]).expect_failure(1, &[told, "f/1.jpg", "one photograph for each one"]);
+    desk.put("moved/pano.json", desk.read("pano.json"));
+    let moved = ["compose", "pano.json", "-o", "again.jpg"];
+    finish(trueup(&desk.join("moved"), &moved)).expect_failure(1, &[told, "back into their folders"]);
+    assert!(!desk.join("again.jpg").exists() && !desk.join("moved/again.jpg").exists());
 }

@@ -150,7 +150,11 @@ fn camera_raw_is_developed_by_a_program_that_is_installed() {
             "{said}"
         );
         assert!(said.contains("2 camera raw photographs were developed by dcraw_emu"), "{said}");
-        assert_eq!(std::fs::read_dir(desk.join("pano-developed")).expect("a folder").count(), 2);
+        let made = std::fs::read_dir(desk.join("pano-developed")).expect("a folder");
+        assert_eq!(
+            made.filter(|one| !one.as_ref().expect("readable").path().ends_with(".made-by-trueup.json")).count(),
+            2
+        );
     }
     finish(trueup(desk.path(), &["compose", "p.json", "-o", "again.jpg"])).expect_success();
     assert!(desk.read("again.jpg") == desk.read("pano.jpg"), "composed again from what was developed");

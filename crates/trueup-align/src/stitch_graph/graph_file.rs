@@ -2,11 +2,13 @@
 //!
 //! Two notations are read, line by line; `#` starts a comment:
 //!
-//! * `NAME -- NAME` or `INDEX -- INDEX`: the two photographs overlap. Names are file names, indices count from 0 in the
-//!   order in which the photographs were given.
+//! * `NAME -- NAME` or `INDEX -- INDEX`: the two photographs overlap. Names are file names, with as many of the folders they lie in as tell them from
+//!   others; indices count from 0 in the order in which the photographs were given.
 //! * `{key | value | comment}` as in the graph files of the GSP data sets: `matching_graph_image_edges-I` lists the
 //!   neighbors of photograph I, `center_image_index` names the reference, `center_image_rotation_angle` its rotation in
 //!   degrees; `images_count` must fit the photographs given.
+
+use std::path::Path;
 
 use trueup_core::{Error, Result};
 
@@ -21,12 +23,12 @@ pub struct GraphFile {
     pub reference_rotation_deg: Option<f64>,
 }
 
-/// Reads a graph for photographs called `names`, in the order given. `file` is the file's name, for messages.
+/// Reads a graph for the photographs at these paths, in the order given. `file` is the file's name, for messages.
 ///
 /// # Errors
-/// [`Error::Input`] with the line number for unknown photographs, unreadable lines, a wrong photograph count, a
+/// [`Error::Input`] with the line number for unknown photographs, names of several, unreadable lines, a wrong photograph count, a
 /// photograph joined to itself, or a file without any pair.
-pub fn parse_graph_file(text: &str, names: &[String], file: &str) -> Result<GraphFile> {
+pub fn parse_graph_file(text: &str, photographs: &[&Path], file: &str) -> Result<GraphFile> {
     let mut graph = GraphFile::default();
     // Editors of some systems begin a text with a mark of its byte order, which is no part of the first name.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -36,8 +38,8 @@ pub fn parse_graph_file(text: &str, names: &[String], file: &str) -> Result<Grap
             continue;
         }
         let parsed = match line.strip_prefix('{').and_then(|rest| rest.strip_suffix('}')) {
-            Some(fields) => keyed_line(fields, names, &mut graph),
-            None => pair_line(line, names).map(|edge| graph.edges.push(edge)),
+            Some(fields) => keyed_line(fields, photographs.len(), &mut graph),
+            None => pair_line(line, photographs).map(|edge| graph.edges.push(edge)),
         };
         parsed.map_err(|reason| {
             Error::input(
@@ -55,29 +57,29 @@ pub fn parse_graph_file(text: &str, names: &[String], file: &str) -> Result<Grap
     Ok(graph)
 }
 
-fn pair_line(line: &str, names: &[String]) -> std::result::Result<(usize, usize), String> {
+fn pair_line(line: &str, photographs: &[&Path]) -> std::result::Result<(usize, usize), String> {
     let (first, second) = line.split_once("--").ok_or_else(|| format!("\"{line}\" is not a pair"))?;
-    ordered(photograph(first, names)?, photograph(second, names)?)
+    ordered(photograph(first, photographs)?, photograph(second, photographs)?)
 }
 
-fn keyed_line(fields: &str, names: &[String], graph: &mut GraphFile) -> std::result::Result<(), String> {
+fn keyed_line(fields: &str, count: usize, graph: &mut GraphFile) -> std::result::Result<(), String> {
     let mut parts = fields.split('|').map(str::trim);
     let (key, value) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
     if let Some(owner) = key.strip_prefix("matching_graph_image_edges-") {
-        let owner = index(owner, names)?;
+        let owner = index(owner, count)?;
         for neighbor in value.split([' ', ',']).filter(|word| !word.is_empty()) {
-            graph.edges.push(ordered(owner, index(neighbor, names)?)?);
+            graph.edges.push(ordered(owner, index(neighbor, count)?)?);
         }
         return Ok(());
     }
     match key {
-        "center_image_index" => graph.reference = Some(index(value, names)?),
+        "center_image_index" => graph.reference = Some(index(value, count)?),
         "center_image_rotation_angle" => {
             let angle: f64 = value.parse().map_err(|_| format!("\"{value}\" is not an angle in degrees"))?;
             graph.reference_rotation_deg = angle.is_finite().then_some(angle);
         }
-        "images_count" if value.parse() != Ok(names.len()) => {
-            return Err(format!("the graph is for {value} photographs, {} were given", names.len()));
+        "images_count" if value.parse() != Ok(count) => {
+            return Err(format!("the graph is for {value} photographs, {count} were given"));
         }
         // Other keys of the notation carry nothing this program uses.
         _ => {}
@@ -85,20 +87,27 @@ fn keyed_line(fields: &str, names: &[String], graph: &mut GraphFile) -> std::res
     Ok(())
 }
 
-fn photograph(text: &str, names: &[String]) -> std::result::Result<usize, String> {
+fn photograph(text: &str, photographs: &[&Path]) -> std::result::Result<usize, String> {
     let text = text.trim().trim_matches('"');
-    match names.iter().position(|name| name == text) {
-        Some(found) => Ok(found),
-        None => index(text, names).map_err(|_| format!("\"{text}\" is none of the {} photographs given", names.len())),
+    let name = Path::new(text.trim_start_matches("./"));
+    let meant = |(at, path): (usize, &&Path)| (!text.is_empty() && path.ends_with(name)).then_some(at);
+    let meant: Vec<usize> = photographs.iter().enumerate().filter_map(meant).collect();
+    match meant[..] {
+        [] => index(text, photographs.len())
+            .map_err(|_| format!("\"{text}\" is none of the {} photographs given", photographs.len())),
+        [found] => Ok(found),
+        // One may be at the very path that ends others'.
+        _ => photographs.iter().position(|path| *path == name).ok_or_else(|| {
+            let paths: Vec<String> = meant.iter().map(|&at| photographs[at].display().to_string()).collect();
+            format!("\"{text}\" may be any of {}", paths.join(", "))
+        }),
     }
 }
 
-fn index(text: &str, names: &[String]) -> std::result::Result<usize, String> {
+fn index(text: &str, count: usize) -> std::result::Result<usize, String> {
     match text.trim().parse::<usize>() {
-        Ok(value) if value < names.len() => Ok(value),
-        _ => {
-            Err(format!("\"{}\" is not a photograph's index from 0 to {}", text.trim(), names.len().saturating_sub(1)))
-        }
+        Ok(value) if value < count => Ok(value),
+        _ => Err(format!("\"{}\" is not a photograph's index from 0 to {}", text.trim(), count.saturating_sub(1))),
     }
 }
 
@@ -110,14 +119,28 @@ fn ordered(a: usize, b: usize) -> std::result::Result<(usize, usize), String> {
 mod tests {
     use super::*;
 
-    fn names() -> Vec<String> {
-        ["a 1.jpg", "b.jpg", "c.jpg"].map(str::to_owned).to_vec()
+    fn names() -> [&'static Path; 3] {
+        ["a 1.jpg", "b.jpg", "c.jpg"].map(Path::new)
     }
 
     #[test]
     fn names_with_spaces_and_indices_are_read() {
         let graph = parse_graph_file("# two pairs\nc.jpg -- a 1.jpg\n0 -- 1 # the first\n\n", &names(), "g.txt");
         assert_eq!(graph.expect("valid").edges, [(0, 1), (0, 2)]);
+    }
+
+    /// By its name alone, with its folder or by its whole path; a name of several photographs is none of one.
+    #[test]
+    fn photographs_of_several_folders_are_told_apart() {
+        let paths = ["/to/a/1.jpg", "/to/b/1.jpg", "/to/b/2.jpg"].map(Path::new);
+        let edges = |text: &str| parse_graph_file(text, &paths, "g.txt").map(|graph| graph.edges);
+        assert_eq!(edges("a/1.jpg -- b/1.jpg\n./b/2.jpg -- /to/a/1.jpg").expect("valid"), [(0, 1), (0, 2)]);
+        assert_eq!(edges("b/1.jpg -- 2.jpg").expect("valid"), [(1, 2)]);
+        let message = edges("1.jpg -- 2.jpg").expect_err("of two").to_string();
+        assert!(message.contains("\"1.jpg\" may be any of /to/a/1.jpg, /to/b/1.jpg"), "{message}");
+        assert!(edges("c/2.jpg -- a/1.jpg").is_err());
+        let same = ["1.jpg", "b/1.jpg"].map(Path::new);
+        assert_eq!(parse_graph_file("1.jpg -- b/1.jpg", &same, "g.txt").expect("valid").edges, [(0, 1)]);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use trueup_core::{Result, StageContext};
 
+use super::inputs::Inputs;
 use super::masks::MaskFile;
 use super::outputs::{Outputs, ReadFile};
 use super::reopen::RecordedPanorama;
@@ -11,7 +12,7 @@ use super::threads::thread_pool;
 use super::write::Written;
 use crate::options::StitchOptions;
 use crate::pipeline::Stitcher;
-use crate::project::read::Recorded;
+use crate::project::read::{Recorded, place_of};
 use crate::project::record::Project;
 
 /// Which recorded panorama to compose, of which photographs, and where to put it.
@@ -62,15 +63,15 @@ impl ComposeJob {
     ///
     /// # Errors
     /// [`trueup_core::Error::Options`]; [`trueup_core::Error::Unsupported`] if an option of the geometry differs from the recorded one;
-    /// [`trueup_core::Error::Input`] if the project was damaged, or photographs are missing or have other sizes; those of composing and
-    /// writing; [`trueup_core::Error::Cancelled`].
+    /// [`trueup_core::Error::Input`] if the project was damaged, photographs are missing or have other sizes, or an output is one of the files
+    /// that are read or recorded; those of composing and writing; [`trueup_core::Error::Cancelled`].
     pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Written> {
         options.validate()?;
         options.refuse_other_geometry(&self.project.options)?;
         // Before files are looked for: a project that was edited to nonsense names itself.
         Recorded::new(&self.project)?;
         self.outputs.check(options)?;
-        self.outputs.refuse_over(self.masks.iter().map(|mask| (mask.file.as_path(), ReadFile::Mask)))?;
+        self.refuse_over_read()?;
         thread_pool(self.threads)?.install(|| {
             let stitcher = Stitcher::new(options, context);
             let recorded = RecordedPanorama {
@@ -81,5 +82,15 @@ impl ComposeJob {
             };
             self.outputs.write(&stitcher, stitcher.reopen(&recorded)?)
         })
+    }
+
+    /// Refuses outputs that are among what is read, or among what the panorama was stitched of, though others may be shown instead.
+    fn refuse_over_read(&self) -> Result<()> {
+        let masks = self.masks.iter().map(|mask| (mask.file.as_path(), ReadFile::Mask));
+        let others = self.photographs.iter().map(|folder| folder.display().to_string());
+        let others = Inputs::new(others).files();
+        let others = others.iter().map(|path| (path.as_path(), ReadFile::Photograph));
+        self.outputs.refuse_over(masks.chain(others))?;
+        self.outputs.refuse_over_recorded(&self.project, |path| place_of(path, &self.project_folder))
     }
 }

@@ -1,17 +1,17 @@
 //! Camera raw among the photographs: what an installed program develops takes its place.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use rayon::prelude::*;
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::developing::Developer;
-use trueup_io::encode::{self, PendingFolder};
-use trueup_io::source;
+use trueup_io::{encode, source};
 
 use super::inputs::Inputs;
-use super::video::{WithFrames, folder_beside, refuse_other_files};
+use super::made::{MadeFolder, WithMade};
+use super::outputs::Outputs;
 
 /// The stage under which progress is told.
 const STAGE: &str = "developing";
@@ -19,17 +19,20 @@ const STAGE: &str = "developing";
 /// Programs at work at once: each takes some twenty bytes for a pixel.
 const AT_ONCE: usize = 4;
 
+/// How the name of the folder of developed photographs ends.
+const DEVELOPED: &str = "-developed";
+
 /// How the names of developed photographs end, behind the whole name of the raw one.
 const DEVELOPED_END: &str = ".tif";
 
-/// Has the camera raw that `inputs` name developed, into a folder beside `panorama`, which is replaced if it holds such files of an earlier run;
-/// `None` if there is none, no program is installed that develops it, or the panorama has no place on the disk: then it is left out with the
-/// command that converts it.
+/// Has the camera raw that `inputs` name developed, into a folder that is to lie beside the panorama; `None` if there is none, no program is
+/// installed that develops it, or the panorama has no place on the disk: then it is left out with the command that converts it.
 ///
 /// # Errors
-/// [`Error::Input`] if the folder holds other files; [`Error::Io`]; [`Error::Cancelled`].
-pub(super) fn with_developed(inputs: &Inputs, panorama: &Path, context: &StageContext) -> Result<Option<WithFrames>> {
-    let Some(developer) = Developer::installed().filter(|_| !encode::passes_through(panorama)) else { return Ok(None) };
+/// Those of [`MadeFolder::begin`]; [`Error::Io`]; [`Error::Cancelled`].
+pub(super) fn with_developed(inputs: &Inputs, outputs: &Outputs, context: &StageContext) -> Result<Option<WithMade>> {
+    let developer = Developer::installed().filter(|_| !encode::passes_through(&outputs.panorama));
+    let Some(developer) = developer else { return Ok(None) };
     let raw_of =
         |name: &String| if inputs.in_memory.get(name).is_none() { source::raw_files(name) } else { Vec::new() };
     let raw: Vec<Vec<PathBuf>> = inputs.photographs.iter().map(raw_of).collect();
@@ -37,21 +40,19 @@ pub(super) fn with_developed(inputs: &Inputs, panorama: &Path, context: &StageCo
     if all.is_empty() {
         return Ok(None);
     }
-    let folder = folder_beside(panorama, "-developed");
-    refuse_other_files(&folder, |name| name.strip_suffix(DEVELOPED_END).is_some_and(|raw| raw.contains('.')))?;
-    let pending = PendingFolder::create(&folder)?;
+    let folder = MadeFolder::begin(outputs, DEVELOPED, inputs)?;
     let all = named(all);
     context.progress().begin(STAGE, all.len() as u64);
     let mut told = Vec::new();
     let mut developed = Vec::new();
     for some in all.chunks(AT_ONCE) {
-        let develop = |(path, name): &(&PathBuf, String)| developer.develop(path, &pending.path().join(name), context);
+        let develop = |(path, name): &(&PathBuf, String)| developer.develop(path, &folder.path().join(name), context);
         let made: Vec<Result<()>> = some.par_iter().map(develop).collect();
         for ((path, name), made) in some.iter().zip(made) {
             match made {
-                Ok(()) => developed.push((*path, folder.join(name))),
+                Ok(()) => developed.push((*path, folder.path().join(name))),
                 Err(Error::Input { reason, hint, .. }) => {
-                    let _ = std::fs::remove_file(pending.path().join(name));
+                    let _ = std::fs::remove_file(folder.path().join(name));
                     told.push(Diagnostic::warning("raw-not-developed", Subject::file(path.display()), reason, hint));
                 }
                 Err(other) => return Err(other),
@@ -61,12 +62,11 @@ pub(super) fn with_developed(inputs: &Inputs, panorama: &Path, context: &StageCo
     }
     context.progress().finish(STAGE);
     if developed.is_empty() {
-        return Ok(Some(WithFrames { inputs: inputs.clone(), told }));
+        return Ok(Some(WithMade { inputs: inputs.clone(), told, made: None }));
     }
-    pending.commit()?;
     told.push(Diagnostic::note(
         "raw-developed",
-        Subject::file(folder.display()),
+        Subject::file(folder.folder().display()),
         format!("{} camera raw photographs were developed by {} into this folder", developed.len(), developer.name()),
         "Keep that folder as long as the panorama may be composed again.",
     ));
@@ -80,7 +80,8 @@ pub(super) fn with_developed(inputs: &Inputs, panorama: &Path, context: &StageCo
         stood_for: developed.iter().map(|(raw, _)| (*raw).clone()).collect(),
         ..inputs.clone()
     };
-    Ok(Some(WithFrames { inputs, told }))
+    let inputs = folder.named_in(inputs);
+    Ok(Some(WithMade { inputs, told, made: Some(folder) }))
 }
 
 /// The names of developed photographs: two of one name may come from two folders.

@@ -1,11 +1,11 @@
 //! What is to be stitched, and what the user wants of it.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use trueup_align::stitch_graph::{GraphFile, parse_graph_file};
 use trueup_core::{Error, Result};
-use trueup_io::source::{self, InMemory};
+use trueup_io::source::{self, InMemory, RejectedSource};
 
 use super::masks::MaskFile;
 
@@ -41,17 +41,25 @@ pub struct Inputs {
     /// Files that the photographs name and that are passed over, since others among the photographs stand for them: camera raw that was
     /// developed.
     pub stood_for: BTreeSet<PathBuf>,
+    /// Files that the photographs name and that cannot be used for a reason which their content alone does not tell: videos that no frames
+    /// could be taken out of.
+    pub unusable: Vec<RejectedSource>,
 }
 
 impl Inputs {
-    /// What the graph file says of photographs called `names`; nothing without one.
+    /// What the graph file says of the photographs at these paths; nothing without one.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is none.
-    pub(crate) fn graph_file(&self, names: &[String]) -> Result<GraphFile> {
+    /// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is no text, or no graph of these photographs.
+    pub(crate) fn graph_file(&self, photographs: &[&Path]) -> Result<GraphFile> {
         let Some(path) = &self.graph else { return Ok(GraphFile::default()) };
-        let text = std::fs::read_to_string(path).map_err(|error| Error::io("reading", path, error))?;
-        parse_graph_file(&text, names, &path.display().to_string())
+        let file = path.display().to_string();
+        let bytes = std::fs::read(path).map_err(|error| Error::io("reading", path, error))?;
+        let text = std::str::from_utf8(&bytes).map_err(|error| {
+            let reason = format!("it is no text in UTF-8 ({error})");
+            Error::input(&file, reason, "Save it as text in UTF-8, with one pair per line as NAME -- NAME.")
+        })?;
+        parse_graph_file(text, photographs, &file)
     }
 
     /// The files that the photographs' names, folders and patterns stand for, in their order, whether or not they are

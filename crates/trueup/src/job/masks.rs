@@ -14,6 +14,7 @@ use trueup_io::source::{InMemory, SourceOptions};
 use trueup_vision::features::Features;
 
 use super::names::photograph_named;
+use crate::project::read::place_of;
 
 /// What a mask means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -108,19 +109,14 @@ impl AllMasks {
                 continue;
             }
             for record in *records {
-                let places = [
-                    project_folder.join(&record.path),
-                    PathBuf::from(&record.path),
-                    project_folder.join(record.file_name()),
-                ];
-                let file = places.iter().find(|path| path.is_file()).ok_or_else(|| {
+                let file = place_of(&record.path, project_folder).ok_or_else(|| {
                     Error::input(
                         &record.path,
                         format!("this mask of {} is not there", image.name),
                         "Put it back, or give another mask of this photograph with --mask or --keep.",
                     )
                 })?;
-                let white = decode::mask(file, image, options, context)?;
+                let white = decode::mask(&file, image, options, context)?;
                 self.add(position, white, MaskRecord { path: file.display().to_string(), kind: record.kind });
             }
         }

@@ -5,6 +5,7 @@ mod developed;
 pub(crate) mod inputs;
 mod layers;
 pub(crate) mod lens_from;
+mod made;
 pub(crate) mod masks;
 pub(crate) mod names;
 mod outputs;

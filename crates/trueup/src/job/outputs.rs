@@ -150,7 +150,8 @@ impl Outputs {
         numbered.take_while(|path| source::is_own_panorama(path)).collect()
     }
 
-    fn files(&self) -> impl Iterator<Item = &Path> {
+    /// The panorama's file and those beside it.
+    pub(super) fn files(&self) -> impl Iterator<Item = &Path> {
         std::iter::once(&self.panorama).chain(self.beside.values()).map(PathBuf::as_path)
     }
 

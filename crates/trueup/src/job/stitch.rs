@@ -8,9 +8,10 @@ use trueup_core::{Result, StageContext};
 
 use super::developed::with_developed;
 use super::inputs::Inputs;
+use super::made::{WithMade, settle};
 use super::outputs::{Outputs, ReadFile};
 use super::threads::thread_pool;
-use super::video::{WithFrames, with_frames};
+use super::video::with_frames;
 use super::write::Written;
 use crate::memo::PhotographCache;
 use crate::options::StitchOptions;
@@ -46,11 +47,11 @@ pub struct StitchJob {
 impl StitchJob {
     /// Runs the job. Outputs are checked before work starts, written beside their place and renamed. Of videos that
     /// [`Inputs::photographs`] names, the frames that are needed are taken out into a folder beside the panorama; camera raw is developed into
-    /// another, where a program that does so is installed.
+    /// another, where a program that does so is installed. These folders take their places when a panorama is written.
     ///
     /// # Errors
     /// Those of [`Stitcher::align`] and [`Stitcher::compose`], and those of writing; [`trueup_core::Error::Input`] if the
-    /// output is one of the photographs. Panoramas already written stay.
+    /// output is one of the photographs, or a folder that is made beside it would replace other files. Panoramas already written stay.
     pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
         options.validate()?;
         self.check(&self.outputs, options)?;
@@ -66,11 +67,12 @@ impl StitchJob {
         context: &StageContext,
     ) -> Result<Vec<Written>> {
         let mut inputs = Cow::Borrowed(&self.inputs);
-        let mut told = Vec::new();
+        let (mut told, mut folders) = (Vec::new(), Vec::new());
         for replaced in [with_frames, with_developed] {
-            if let Some(WithFrames { inputs: new, told: said }) = replaced(&inputs, &self.outputs.panorama, context)? {
+            if let Some(WithMade { inputs: new, told: said, made }) = replaced(&inputs, &self.outputs, context)? {
                 inputs = Cow::Owned(new);
                 told.extend(said);
+                folders.extend(made);
             }
         }
         let stitcher = Stitcher::new(options, context).with_cache(cache);
@@ -90,7 +92,17 @@ impl StitchJob {
             first.project.diagnostics.extend(stale.iter().map(|path| stale_panorama(path, count)));
         }
         let all = aligned.alignments.into_iter().zip(&outputs);
-        all.map(|(alignment, outputs)| outputs.write(&stitcher, alignment)).collect()
+        if folders.is_empty() {
+            return all.map(|(alignment, outputs)| outputs.write(&stitcher, alignment)).collect();
+        }
+        // What was made is read where it is now until the last panorama is written, and recorded where it will be: records come last.
+        let mut written = Vec::new();
+        let whole = all.into_iter().try_for_each(|(alignment, outputs)| {
+            written.push(outputs.write_pictures(&stitcher, alignment)?);
+            Ok(())
+        });
+        let recorded = settle(folders, &mut written).and_then(|()| written.iter().try_for_each(Written::write_records));
+        whole.and(recorded).map(|()| written)
     }
 
     /// Refuses outputs that cannot be written, or are among the inputs, before the inputs are looked into.

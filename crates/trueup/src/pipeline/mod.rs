@@ -155,7 +155,8 @@ impl<'a> Stitcher<'a> {
         let found = self.context.gather(|context| {
             let memo = Memo { disk: self.cache, memory: None };
             let found = context.gather(|context| PhotographSet::find(inputs, self.options, context))?;
-            let graph_file = inputs.graph_file(&found.value.names())?;
+            let paths: Vec<&Path> = found.value.images.iter().map(|image| image.path.as_path()).collect();
+            let graph_file = inputs.graph_file(&paths)?;
             let keep_grays = align::needs_pixels(&self.options.align);
             let scratch = scratch::while_measuring(self.options, self.output);
             let shelf = Shelf::new(&scratch, found.value.images.len(), found.value.measuring.held_features);

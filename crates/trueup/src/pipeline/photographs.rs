@@ -69,6 +69,7 @@ impl PhotographSet {
         let (sources, mut told) = context.gather(|context| context.time("source", || scan(context)))?.split();
         let Sources { photographs, mut rejected } = sources;
         rejected.retain(|one| !inputs.stood_for.contains(&one.path));
+        rejected.iter_mut().for_each(|one| tell_why(one, &inputs.unusable));
         if photographs.is_empty() {
             return Err(nothing_found(inputs, &rejected));
         }
@@ -149,6 +150,13 @@ impl PhotographSet {
             Ok(whole.flatten())
         };
         photographs.par_iter().map(key).collect()
+    }
+}
+
+/// Puts the reason that is `known` for a file in place of what its content tells.
+fn tell_why(rejected: &mut RejectedSource, known: &[RejectedSource]) {
+    if let Some(known) = known.iter().find(|known| known.path == rejected.path) {
+        *rejected = RejectedSource { name: std::mem::take(&mut rejected.name), ..known.clone() };
     }
 }
 

@@ -248,8 +248,15 @@ pub(crate) fn find_photograph(
     Ok(image)
 }
 
-/// The file of a recorded path: beside the project file as recorded, from the current folder, or beside the project file by its name
-/// alone.
+/// Where the file of a recorded path is: beside the project file as recorded, from the current folder, or beside the project file by its
+/// name alone; `None` if it is at none of these places.
+pub(crate) fn place_of(recorded: &str, project_folder: &Path) -> Option<PathBuf> {
+    let path = Path::new(recorded);
+    let places = [project_folder.join(path), path.to_owned(), project_folder.join(file_name(recorded))];
+    places.into_iter().find(|path| path.is_file())
+}
+
+/// The file of a recorded path, at its [place](place_of).
 ///
 /// # Errors
 /// [`Error::Input`] if there is none or it cannot be read; [`Error::Options`]; [`Error::Cancelled`].
@@ -259,9 +266,7 @@ pub(crate) fn find_file(
     options: &SourceOptions,
     context: &StageContext,
 ) -> Result<SourceImage> {
-    let path = Path::new(recorded);
-    let places = [project_folder.join(path), path.to_owned(), project_folder.join(file_name(recorded))];
-    let Some(path): Option<PathBuf> = places.into_iter().find(|path| path.is_file()) else {
+    let Some(path) = place_of(recorded, project_folder) else {
         return Err(Error::input(
             recorded,
             "photograph not found, neither here nor beside the project file",

@@ -1,6 +1,7 @@
 //! The photographs that a recorded panorama is composed of again.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use trueup_core::source::{SourceImage, StackMember};
 use trueup_core::{Error, Result, StageContext};
@@ -13,7 +14,8 @@ use crate::report::several::several;
 /// The recorded photographs themselves, in the order of `records`.
 ///
 /// # Errors
-/// [`Error::Input`] that names every one that is missing, unreadable or of another size; [`Error::Cancelled`].
+/// [`Error::Input`] that names every one that is missing, unreadable or of another size, or a file that would stand for two;
+/// [`Error::Cancelled`].
 pub(crate) fn recorded_photographs(
     records: &[&ImageRecord],
     project_folder: &Path,
@@ -21,7 +23,25 @@ pub(crate) fn recorded_photographs(
     context: &StageContext,
 ) -> Result<Vec<SourceImage>> {
     let found = records.iter().map(|record| find_photograph(record, project_folder, options, context));
-    all_of(found, "Give the folder that holds the photographs after --photos.")
+    let found = all_of(found, "Give the folder that holds the photographs after --photos.")?;
+    let hint = "Put the photographs back into their folders, beside the project file or where the command is run.";
+    refuse_one_for_two(records, &found, hint).map(|()| found)
+}
+
+/// Refuses a file that was found for two recorded photographs, whose names are the same where their folders are not looked at.
+fn refuse_one_for_two(records: &[&ImageRecord], found: &[SourceImage], hint: &str) -> Result<()> {
+    let mut taken: BTreeMap<PathBuf, &str> = BTreeMap::new();
+    for (record, image) in records.iter().zip(found) {
+        let members = record.stack.iter().zip(&image.stack).map(|(member, found)| (&member.path, &found.source.path));
+        for (recorded, path) in std::iter::once((&record.path, &image.path)).chain(members) {
+            let place = path.canonicalize().unwrap_or_else(|_| path.clone());
+            if let Some(other) = taken.insert(place, recorded) {
+                let reason = format!("it would stand for two photographs of the panorama, {other} and {recorded}");
+                return Err(Error::input(path.display(), reason, hint));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Other photographs of the same sizes, in the order of `records`: each of `names` is one, a file or in memory.
@@ -55,8 +75,8 @@ pub(crate) fn named_photographs(
 /// extensions, or, if not one name is known and there are as many files as records, by the natural order of names.
 ///
 /// # Errors
-/// [`Error::Input`] that names every photograph that has no replacement, or whose replacement has another size;
-/// [`Error::Cancelled`].
+/// [`Error::Input`] that names every photograph that has no replacement, or whose replacement has another size, or a file that would replace
+/// two; [`Error::Cancelled`].
 pub(crate) fn other_photographs(
     records: &[&ImageRecord],
     folder: &Path,
@@ -85,7 +105,10 @@ pub(crate) fn other_photographs(
         let stack = replaced_stack(record, &sources.photographs);
         Ok(SourceImage { stack, ..image })
     });
-    all_of(found, "Give a folder with a photograph of the same name and size for each one of the panorama.")
+    let found =
+        all_of(found, "Give a folder with a photograph of the same name and size for each one of the panorama.")?;
+    let hint = "Give a folder that holds one photograph for each one of the panorama, in their order and under names that are none of theirs.";
+    refuse_one_for_two(records, &found, hint).map(|()| found)
 }
 
 /// The other exposures of a recorded photograph among others of the same names, or of these without extensions; none where one of them is
@@ -189,6 +212,37 @@ mod tests {
 
     fn chosen(names: &[&str], files: &[&str]) -> Vec<Choice> {
         choose(names, &files.iter().map(|&file| file.to_owned()).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn one_file_stands_for_one_photograph() {
+        let member =
+            |path: &str| serde_json::json!({"path": path, "reference_from_member": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]});
+        let record = |path: &str, others: &[&str]| -> ImageRecord {
+            let stack: Vec<_> = others.iter().map(|other| member(other)).collect();
+            serde_json::from_value(serde_json::json!({
+                "path": path, "width": 8, "height": 6, "status": "used", "reason": "", "hint": "", "stack": stack
+            }))
+            .expect("a record")
+        };
+        let found = |path: &str, others: &[&str]| {
+            let image = |path: &str| SourceImage::unknown(path, path, [8, 6]);
+            let member = |path: &&str| StackMember { source: image(path), reference_from_member: [[0.0; 3]; 3] };
+            SourceImage { stack: others.iter().map(member).collect(), ..image(path) }
+        };
+        let (a, b) = (record("a/1.jpg", &["a/2.jpg"]), record("b/1.jpg", &["b/2.jpg"]));
+        let records = [&a, &b];
+        let good = [found("f/1.jpg", &["f/2.jpg"]), found("g/1.jpg", &["g/2.jpg"])];
+        refuse_one_for_two(&records, &good, "").expect("each is itself");
+        for (other, taken, two) in [
+            (found("f/1.jpg", &["g/2.jpg"]), "f/1.jpg", "a/1.jpg and b/1.jpg"),
+            (found("g/1.jpg", &["f/2.jpg"]), "f/2.jpg", "a/2.jpg and b/2.jpg"),
+            (found("f/2.jpg", &[]), "f/2.jpg", "a/2.jpg and b/1.jpg"),
+        ] {
+            let refused = refuse_one_for_two(&records, &[good[0].clone(), other], "").expect_err("twice").to_string();
+            let expected = format!("{taken}: it would stand for two photographs of the panorama, {two}");
+            assert!(refused.starts_with(&expected), "{refused}");
+        }
     }
 
     #[test]

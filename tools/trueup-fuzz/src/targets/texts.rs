@@ -1,5 +1,7 @@
 //! Projects, graphs and configurations.
 
+use std::path::Path;
+
 use trueup::{HuginProject, Project, StitchOptions, hugin_project};
 use trueup_align::stitch_graph::parse_graph_file;
 
@@ -67,9 +69,9 @@ pub(super) fn graphs() -> Vec<Vec<u8>> {
 }
 
 pub(super) fn read_graph(_: &Work, input: &[u8]) {
-    let names = ["a 1.jpg", "b.jpg", "c.jpg"].map(str::to_owned);
-    if let Ok(graph) = parse_graph_file(&String::from_utf8_lossy(input), &names, "graph.txt") {
-        let is_known = |photograph: usize| photograph < names.len();
+    let photographs = ["a 1.jpg", "b.jpg", "to/c.jpg"].map(Path::new);
+    if let Ok(graph) = parse_graph_file(&String::from_utf8_lossy(input), &photographs, "graph.txt") {
+        let is_known = |photograph: usize| photograph < photographs.len();
         assert!(graph.edges.iter().all(|&(a, b)| is_known(a) && is_known(b) && a != b));
         assert!(graph.reference.is_none_or(is_known));
     }
