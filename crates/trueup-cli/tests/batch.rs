@@ -93,6 +93,50 @@ fn every_set_is_stitched_once_and_a_bad_one_stops_nothing() {
     assert!(told.ends_with("3 panoramas of 4 sets, 1 is a single photograph: out/index.html\n"), "{told}");
 }
 
+/// A folder of photographs that is called like a file of the batch, and one whose set can be given no folder: both fail with what
+/// to do about it, the others are made, and the files of all sets tell so.
+#[test]
+fn a_set_that_can_have_no_folder_stops_nothing() {
+    let desk = tree(1);
+    std::fs::remove_dir_all(desk.join("in/bad")).expect("removed");
+    std::fs::create_dir(desk.join("in/batch.csv")).expect("a folder");
+    for (name, bytes) in ["a.jpg", "b.jpg"].iter().zip(street()) {
+        desk.put(&format!("in/batch.csv/{name}"), bytes);
+    }
+    std::fs::create_dir(desk.join("out")).expect("a folder");
+    desk.put("out/lonely", "a file");
+    for _ in 0..2 {
+        let ended = finish(batch(&desk, &["--quiet"]));
+        assert_eq!(ended.status, 3, "{}", ended.stderr);
+        let all = lines(&String::from_utf8(desk.read("out/batch.jsonl")).expect("UTF-8"));
+        let expected = [("batch.csv", "failed"), ("lonely", "failed"), ("street 1", "made")];
+        assert_eq!(statuses(&all), expected.map(|(set, status)| (set.to_owned(), status.to_owned())));
+        assert_eq!(all[0]["hint"], "Rename the folder of its photographs.");
+        assert!(all[1]["hint"].as_str().is_some_and(|hint| hint.contains("permissions")), "{}", all[1]);
+    }
+    let table = String::from_utf8(desk.read("out/batch.csv")).expect("UTF-8");
+    assert!(table.contains("\"batch.csv\",\"failed\""), "{table}");
+}
+
+#[test]
+fn a_folder_for_panoramas_that_cannot_be_is_refused_with_what_to_do() {
+    let desk = tree(1);
+    desk.put("a.jpg", "a file");
+    let refused = finish(trueup(desk.path(), &["batch", "in", "-o", "a.jpg"]));
+    assert_eq!(refused.status, 1);
+    assert_eq!(
+        refused.stderr,
+        "trueup: error: a.jpg: it is no folder, but a file\ntrueup: hint: Choose another folder for the panoramas.\n"
+    );
+    // All photographs lie where the panoramas are to be, which is said beside that there are none.
+    std::fs::create_dir(desk.join("tree")).expect("a folder");
+    std::fs::rename(desk.join("in"), desk.join("tree/day")).expect("moved");
+    let none = finish(trueup(desk.path(), &["batch", "tree", "-o", "tree/day"]));
+    assert_eq!(none.status, 1);
+    assert!(none.stderr.starts_with("trueup: warning: tree/day: the photographs in it ("), "{}", none.stderr);
+    assert!(none.stderr.contains("there are no photographs in it"), "{}", none.stderr);
+}
+
 #[test]
 fn shards_share_the_work_and_the_last_one_sums_all_up() {
     let desk = tree(3);

@@ -9,11 +9,11 @@ use trueup::{Batch, Error, SetRecord, StageContext, StitchOptions};
 use super::{lines, page, table};
 
 /// The file of all lines.
-pub(super) const LINES: &str = "batch.jsonl";
+pub(super) const LINES: &str = Batch::LINES;
 /// The table of all panoramas.
-const TABLE: &str = "batch.csv";
+const TABLE: &str = Batch::TABLE;
 /// The page of all panoramas.
-pub(super) const PAGE: &str = "index.html";
+pub(super) const PAGE: &str = Batch::PAGE;
 
 /// How often the files of all sets are written while sets are worked at: each time every record is read.
 const SUM_UP_EVERY: Duration = Duration::from_secs(60);

@@ -5,6 +5,8 @@ use std::path::Path;
 use serde_json::{Value, json};
 use trueup::{Batch, SetOutcome, SetRecord};
 
+use crate::words::one_line;
+
 /// The `format` field of every line.
 const FORMAT: &str = "trueup-batch";
 /// The `version` field: raised when a field changes its meaning or goes away.
@@ -12,7 +14,12 @@ const VERSION: u32 = 1;
 
 /// A line of JSON for every panorama of a set, or one that says why there is none.
 pub(super) fn json(record: &SetRecord) -> String {
-    let told = |status: &str, more: Value| line(&record.set, status, record.photographs.into(), more);
+    let told = |status: &str, mut more: Value| {
+        if !record.outdated.is_empty() {
+            more["outdated"] = json!(record.outdated);
+        }
+        line(&record.set, status, record.photographs.into(), more)
+    };
     match &record.outcome {
         SetOutcome::Made(panoramas) => panoramas.iter().map(|one| told("made", one.clone())).collect(),
         SetOutcome::Failed { error, hint, may_pass } => {
@@ -34,12 +41,13 @@ fn line(set: &str, status: &str, photographs: Value, more: Value) -> String {
 
 /// The same for people.
 pub(super) fn words(record: &SetRecord) -> String {
-    let set = &record.set;
-    match &record.outcome {
+    let set = one_line(&record.set);
+    let outdated = record.outdated.iter().map(|file| format!("{set}: {} is of an earlier attempt\n", one_line(file)));
+    let told = match &record.outcome {
         SetOutcome::Made(panoramas) => {
             let one = |one: &Value| {
                 let used = one["used"].as_array().map_or(0, Vec::len);
-                let file = one["panorama"].as_str().unwrap_or_default();
+                let file = one_line(one["panorama"].as_str().unwrap_or_default());
                 format!(
                     "{set}: {file}  {} x {} px, {used} of {} photographs\n",
                     one["width"], one["height"], record.photographs
@@ -47,9 +55,10 @@ pub(super) fn words(record: &SetRecord) -> String {
             };
             panoramas.iter().map(one).collect()
         }
-        SetOutcome::Failed { error, .. } => format!("{set}: no panorama: {error}\n"),
+        SetOutcome::Failed { error, .. } => format!("{set}: no panorama: {}\n", one_line(error)),
         SetOutcome::Alone => format!("{set}: 1 photograph, which makes no panorama\n"),
-    }
+    };
+    std::iter::once(told).chain(outdated).collect()
 }
 
 /// The sets that are to be stitched.
@@ -58,8 +67,8 @@ pub(super) fn plan(batch: &Batch, as_json: bool) -> String {
         let paths: Vec<String> = set.photographs.iter().map(|path| path.display().to_string()).collect();
         match (as_json, set.is_alone()) {
             (true, _) => line(&set.name, "planned", paths.into(), json!({})),
-            (false, true) => format!("{}: 1 photograph, which makes no panorama\n", set.name),
-            (false, false) => format!("{}: {} photographs\n", set.name, paths.len()),
+            (false, true) => format!("{}: 1 photograph, which makes no panorama\n", one_line(&set.name)),
+            (false, false) => format!("{}: {} photographs\n", one_line(&set.name), paths.len()),
         }
     };
     batch.planned().map(one).collect()
@@ -79,7 +88,7 @@ pub(super) fn all(records: &[SetRecord], page: &Path) -> String {
     if alone > 0 {
         parts.push(counted(alone, "is a single photograph", "are single photographs"));
     }
-    format!("{}: {}\n", parts.join(", "), page.display())
+    format!("{}: {}\n", parts.join(", "), one_line(&page.display().to_string()))
 }
 
 #[cfg(test)]
@@ -87,7 +96,14 @@ mod tests {
     use super::*;
 
     fn record(set: &str, outcome: SetOutcome) -> SetRecord {
-        SetRecord { set: set.to_owned(), photographs: 3, made_of: Value::Null, ended_ms: 0, outcome }
+        SetRecord {
+            set: set.to_owned(),
+            photographs: 3,
+            made_of: Value::Null,
+            ended_ms: 0,
+            outcome,
+            outdated: Vec::new(),
+        }
     }
 
     #[test]
@@ -107,5 +123,23 @@ mod tests {
         assert!(json(&failed).contains("\"hint\":\"Look.\"") && json(&alone).contains("\"alone\""));
         let told = all(&[made, failed, alone], Path::new("out/index.html"));
         assert_eq!(told, "2 panoramas of 3 sets, 1 set made none, 1 is a single photograph: out/index.html\n");
+    }
+
+    #[test]
+    fn what_an_earlier_attempt_left_is_told_from_what_is_made() {
+        let outdated = vec!["c/panorama.jpg".to_owned()];
+        let left = SetRecord { outdated, ..record("c", SetOutcome::Alone) };
+        let said = "c: 1 photograph, which makes no panorama\nc: c/panorama.jpg is of an earlier attempt\n";
+        assert_eq!(words(&left), said);
+        assert!(json(&left).contains("\"outdated\":[\"c/panorama.jpg\"]"), "{}", json(&left));
+        assert!(!json(&record("c", SetOutcome::Alone)).contains("outdated"));
+    }
+
+    #[test]
+    fn a_set_has_a_line_whatever_its_name() {
+        let failure = SetOutcome::Failed { error: "a\nb: none".to_owned(), hint: String::new(), may_pass: false };
+        assert_eq!(words(&record("a\nb\tc", failure)), "a\\nb\\tc: no panorama: a\\nb: none\n");
+        let panorama = json!({ "panorama": "a\nb/p.jpg", "width": 3, "height": 2, "used": [] });
+        assert_eq!(words(&record("a\nb", SetOutcome::Made(vec![panorama]))).lines().count(), 1);
     }
 }

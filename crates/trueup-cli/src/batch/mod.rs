@@ -30,8 +30,10 @@ pub fn batch_plan(batch: &Batch) -> String {
 pub(crate) fn run(args: BatchArgs) -> Result<(), Failure> {
     let options = chosen::options(StitchOptions::default(), &args.tuning, &args.typed)?;
     progress::shown(args.quiet || args.json, |context| {
-        let batch = Batch::find(job(&args), context)?;
+        let found = Batch::find(job(&args), context);
+        // What was passed over may be why there is nothing.
         warn(&context.findings());
+        let batch = found?;
         if args.dry_run {
             return output::print(&lines::plan(&batch, args.json));
         }

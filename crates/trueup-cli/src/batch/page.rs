@@ -46,6 +46,7 @@ fn set(record: &SetRecord) -> Value {
         "error": error,
         "hint": hint,
         "panoramas": panoramas.iter().map(one).collect::<Vec<_>>(),
+        "outdated": record.outdated.iter().map(|file| json!({ "name": file, "file": address(&file.as_str().into()) })).collect::<Vec<_>>(),
     })
 }
 
@@ -77,9 +78,14 @@ mod tests {
             made_of: Value::Null,
             ended_ms: 0,
             outcome: SetOutcome::Made(vec![panorama]),
+            outdated: Vec::new(),
         };
         let failed = SetOutcome::Failed { error: "<b>".to_owned(), hint: String::new(), may_pass: false };
-        let page = text(&[record.clone(), SetRecord { outcome: failed, ..record }], 2).expect("a page");
+        let outdated = vec!["old #1.jpg".to_owned()];
+        let failed = SetRecord { outcome: failed, outdated, ..record.clone() };
+        let page = text(&[record.clone(), failed], 2).expect("a page");
+        assert!(page.contains("old%20%231.jpg") && page.contains("earlier attempt"), "{page}");
+        assert!(!text(&[record], 1).expect("a page").contains("earlier attempt"));
         assert!(!page.contains("<script") && !page.contains("<b>"), "{page}");
         assert_eq!(address(&"a b/#1?.jpg".into()), "./a%20b/%231%3F.jpg");
         assert!(page.contains("a%20b") && page.contains("%231%3F.jpg"), "{page}");

@@ -4,7 +4,7 @@ use serde_json::Value;
 use trueup::{SetOutcome, SetRecord};
 
 /// The columns' names.
-const COLUMNS: [&str; 13] = [
+const COLUMNS: [&str; 14] = [
     "set",
     "status",
     "photographs",
@@ -18,7 +18,13 @@ const COLUMNS: [&str; 13] = [
     "warnings",
     "seconds",
     "error",
+    "outdated",
 ];
+/// The positions of those that every set has.
+const ERROR: usize = COLUMNS.len() - 2;
+const OUTDATED: usize = COLUMNS.len() - 1;
+/// What parts the files in the last column.
+const BETWEEN_FILES: &str = "; ";
 
 /// A row for every panorama, and one for every set that made none.
 ///
@@ -36,7 +42,8 @@ fn rows(record: &SetRecord) -> Vec<[String; COLUMNS.len()]> {
         row[0].clone_from(&record.set);
         row[1] = status.to_owned();
         row[2] = record.photographs.to_string();
-        row[COLUMNS.len() - 1] = error;
+        row[ERROR] = error;
+        row[OUTDATED] = record.outdated.join(BETWEEN_FILES);
         row
     };
     match &record.outcome {
@@ -66,6 +73,7 @@ fn row(record: &SetRecord, panorama: &Value) -> [String; COLUMNS.len()] {
         count("warnings"),
         panorama["seconds"].as_f64().map(|seconds| format!("{seconds:.1}")).unwrap_or_default(),
         String::new(),
+        record.outdated.join(BETWEEN_FILES),
     ]
 }
 
@@ -93,15 +101,17 @@ mod tests {
             made_of: Value::Null,
             ended_ms: 0,
             outcome: SetOutcome::Made(vec![panorama]),
+            outdated: Vec::new(),
         };
         let failure = SetOutcome::Failed { error: "x: none".to_owned(), hint: "Look.".to_owned(), may_pass: false };
-        let failed = SetRecord { set: "b, c".to_owned(), outcome: failure, ..record.clone() };
+        let outdated = vec!["b/1.jpg".to_owned(), "b/2.jpg".to_owned()];
+        let failed = SetRecord { set: "b, c".to_owned(), outcome: failure, outdated, ..record.clone() };
         let text = text(&[record, failed]);
         let lines: Vec<&str> = text.split_terminator("\r\n").collect();
         assert_eq!(lines.len(), 3);
         assert!(lines[0].starts_with("\"set\",\"status\","));
-        let made = r#""'=cmd|""a""","made","3","2","a/p.jpg","30","20","good","","","0","1.2","""#;
+        let made = r#""'=cmd|""a""","made","3","2","a/p.jpg","30","20","good","","","0","1.2","","""#;
         assert_eq!(lines[1], made);
-        assert_eq!(lines[2], r#""b, c","failed","3","","","","","","","","","","x: none. Look.""#);
+        assert_eq!(lines[2], r#""b, c","failed","3","","","","","","","","","","x: none. Look.","b/1.jpg; b/2.jpg""#);
     }
 }

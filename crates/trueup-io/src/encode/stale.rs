@@ -16,10 +16,10 @@ pub(super) fn mark_in_use(file: &File) {
     drop(file.try_lock());
 }
 
-/// Takes away the temporary files in `folder` that programs which were killed left behind, however lately: for a folder that nobody
-/// else writes into now. What cannot be taken away stays.
-pub fn clear_parts(folder: &Path) {
-    clear_stale(folder, Duration::ZERO);
+/// Takes away the temporary files in `folder` that programs which were killed left behind, once nothing was written to them for
+/// `age`: zero for a folder that nobody else writes into now. What cannot be taken away stays.
+pub fn clear_parts(folder: &Path, age: Duration) {
+    clear_stale(folder, age);
 }
 
 /// Takes away the temporary files and folders in `folder` that no living program has marked, once nothing was written to them for

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use trueup_core::{Error, Result};
 
 /// The file in a set's folder that is there while a program works at it, and after one that was killed at it.
-const FILE: &str = "at-work";
+pub(super) const FILE: &str = "at-work";
 
 /// A set that this program works at. Nobody else does while it lives: the file is locked, and a lock goes with the program that
 /// holds it, however it ends.

@@ -2,11 +2,13 @@
 //! machines, and never stopped by one bad set.
 
 mod claim;
+mod names;
 mod queue;
 mod record;
 mod sets;
 mod work;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
@@ -87,14 +89,27 @@ impl BatchJob {
 }
 
 /// A job whose sets were found.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct Batch {
     job: BatchJob,
     sets: Vec<PhotographsOfFolder>,
+    /// Records of sets whose folder takes none, by their positions: known as long as the program runs.
+    unkept: Mutex<BTreeMap<usize, SetRecord>>,
 }
 
 impl Batch {
-    /// Finds the sets of a job. A folder that cannot be read is passed over with the warning `folder-unreadable`.
+    /// The file in the folder of the batch of the lines of all sets.
+    pub const LINES: &str = "batch.jsonl";
+    /// That of the table of all panoramas.
+    pub const TABLE: &str = "batch.csv";
+    /// That of the page of all panoramas.
+    pub const PAGE: &str = "index.html";
+    /// The files of all sets. A set of one of these names fails: its folder would lie where the file does.
+    pub const FILES: [&str; 3] = [Self::LINES, Self::TABLE, Self::PAGE];
+
+    /// Finds the sets of a job. A folder that cannot be read is passed over with the warning `folder-unreadable`, a photograph
+    /// whose name is no UTF-8 with `photograph-name-unreadable`, photographs where the panoramas are to be with
+    /// `output-holds-photographs`.
     ///
     /// # Errors
     /// [`Error::Input`] if the folder is none, holds no photographs, or is the one for the panoramas; [`Error::Io`] if it cannot be
@@ -113,7 +128,7 @@ impl Batch {
                 hint,
             ));
         }
-        Ok(Self { job, sets })
+        Ok(Self { job, sets, unkept: Mutex::default() })
     }
 
     /// All sets, also those of other shards.
@@ -128,12 +143,25 @@ impl Batch {
 
     /// What became of the sets so far, whoever worked at them, in their order.
     pub fn records(&self) -> impl Iterator<Item = SetRecord> {
-        self.sets.iter().filter_map(|set| SetRecord::read(&set.folder_in(&self.job.output)))
+        (0..self.sets.len()).filter_map(|position| self.record_of(position))
     }
 
     /// What became of the sets of this job's shard so far.
     pub fn planned_records(&self) -> impl Iterator<Item = SetRecord> {
-        self.planned().filter_map(|set| SetRecord::read(&set.folder_in(&self.job.output)))
+        self.positions().filter_map(|position| self.record_of(position))
+    }
+
+    /// What became of the set at this position. Of what is kept and what could not be, the later counts: another program may have
+    /// done the set since.
+    fn record_of(&self, position: usize) -> Option<SetRecord> {
+        let kept = SetRecord::read(&self.sets[position].folder_in(&self.job.output));
+        let unkept = self.unkept.lock().unwrap_or_else(PoisonError::into_inner).get(&position).cloned();
+        kept.into_iter().chain(unkept).max_by_key(|record| record.ended_ms)
+    }
+
+    /// Whether a set has this name.
+    fn has_set(&self, name: &str) -> bool {
+        self.sets.iter().any(|set| set.name == name)
     }
 
     /// Stitches the sets that are not done, those last that were begun before and came to no end; `tell` hears of each when its
@@ -141,12 +169,15 @@ impl Batch {
     /// sets of the shard are done.
     ///
     /// A set is done when its record is there. It is done anew only if its photographs, the options that decide panoramas, the
-    /// extension or the version of this program have changed, a panorama is gone, it failed for a reason that may pass, or
-    /// [`BatchJob::retry`] asks for it. Where the file system knows no locks, the warning `folder-without-locks` says so.
+    /// extension or the version of this program have changed, a file of its panoramas is gone or was cut short, a photograph that
+    /// could not be read can be read by now, it failed for a reason that may pass, or [`BatchJob::retry`] asks for it. A set whose
+    /// folder takes no record failed, as long as this `Batch` lives; the next run tries it again. Where the file system knows no
+    /// locks, the warning `folder-without-locks` says so.
     ///
     /// # Errors
-    /// [`Error::Options`], [`Error::Unsupported`] for what could be written of no set; [`Error::Input`] or [`Error::Io`] if records
-    /// cannot be kept; [`Error::Cancelled`]; what `tell` returns. What goes wrong with a set is in its record instead.
+    /// [`Error::Options`], [`Error::Unsupported`] for what could be written of no set; [`Error::Input`] if the folder for the
+    /// panoramas cannot be made; [`Error::Io`] if no records can be kept, as on a full disk; [`Error::Cancelled`]; what `tell`
+    /// returns. What goes wrong with a set is in its record instead.
     pub fn run<E: From<Error> + Send>(
         &self,
         options: &StitchOptions,

@@ -1,7 +1,7 @@
 //! What became of a set of photographs, as it is kept beside its panoramas.
 
 use std::io::ErrorKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
@@ -9,8 +9,15 @@ use serde_json::Value;
 use trueup_core::{Error, Result};
 use trueup_io::encode;
 
+use super::names;
+
 /// The record's file in the folder of a set.
-const FILE: &str = "record.json";
+pub(super) const FILE: &str = "record.json";
+
+/// The field of [`SetRecord::made_of`] that lists the photographs.
+pub(super) const PHOTOGRAPHS: &str = "photographs";
+/// The field of a photograph in it that could not be read; others do not have it.
+pub(super) const UNREADABLE: &str = "unreadable";
 
 /// What became of a set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -26,6 +33,10 @@ pub struct SetRecord {
     pub ended_ms: u64,
     /// What came of it.
     pub outcome: SetOutcome,
+    /// Panoramas that lie in the set's folder and did not come of it now, below the folder of the batch: an earlier attempt made
+    /// them, of other photographs or with other options.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outdated: Vec<String>,
 }
 
 /// What came of a set.
@@ -117,11 +128,41 @@ impl SetRecord {
         }
     }
 
-    /// Whether all panoramas are still there, in the folder of the batch.
-    pub(super) fn files_are_there(&self, output: &Path) -> bool {
-        let is_there = |one: &Value| one["panorama"].as_str().is_some_and(|path| output.join(path).is_file());
-        self.panoramas().iter().all(is_there)
+    /// Whether all panoramas are still there with what lies beside them, in the folder of the batch, and none was cut short. A
+    /// panorama that has grown counts as whole: somebody wrote something into it, as a caption, which is not to be lost.
+    pub(super) fn files_are_whole(&self, output: &Path) -> bool {
+        let is_whole =
+            |file: &Value, bytes: u64| file.as_str().is_some_and(|path| has_bytes(&output.join(path), bytes));
+        let all_are = |one: &Value| {
+            let besides = one["beside"].as_object().into_iter().flat_map(|beside| beside.values());
+            is_whole(&one["panorama"], one["bytes"].as_u64().unwrap_or(1))
+                && besides.into_iter().all(|file| is_whole(file, 1))
+        };
+        self.panoramas().iter().all(all_are)
     }
+
+    /// Whether what is `made_of` now would come to nothing else than the record's. A photograph that could be read then and cannot
+    /// now would only be missing; one that could not be read then and can now is made use of.
+    pub(super) fn is_of(&self, made_of: &Value) -> bool {
+        let mut now = made_of.clone();
+        let before = self.made_of[PHOTOGRAPHS].as_array().map_or(&[][..], Vec::as_slice);
+        let photographs = now[PHOTOGRAPHS].as_array_mut().map_or(&mut [][..], Vec::as_mut_slice);
+        for (now, before) in photographs.iter_mut().zip(before) {
+            if let Some(now) = now.as_object_mut().filter(|_| before.get(UNREADABLE).is_none()) {
+                now.remove(UNREADABLE);
+            }
+        }
+        now == self.made_of
+    }
+}
+
+/// Whether a file is there that has so many bytes at least. Of a panorama of tiles, the bytes are those of all tiles, which are
+/// not counted here: their folder must be there.
+fn has_bytes(path: &Path, bytes: u64) -> bool {
+    let tiles = names::tiles(path);
+    let at_least = if tiles.is_some() { 1 } else { bytes.max(1) };
+    path.metadata().is_ok_and(|file| file.is_file() && file.len() >= at_least)
+        && tiles.is_none_or(|folder| folder.is_dir())
 }
 
 /// Milliseconds since the beginning of the year 1970, now; 0 before it.
@@ -137,8 +178,10 @@ pub(super) fn milliseconds(time: SystemTime) -> u64 {
 
 /// A panorama's summary with its files as they lie below the folder `output`: that can be moved.
 pub(super) fn below(mut panorama: Value, output: &Path) -> Value {
+    // As the summary has it: what is not UTF-8 in its name is replaced there.
+    let output = PathBuf::from(output.display().to_string());
     let shorten = |value: &mut Value| {
-        let inside = value.as_str().and_then(|path| Path::new(path).strip_prefix(output).ok());
+        let inside = value.as_str().and_then(|path| Path::new(path).strip_prefix(&output).ok());
         if let Some(inside) = inside.map(|path| path.display().to_string()) {
             *value = inside.into();
         }
@@ -181,15 +224,12 @@ mod tests {
             made_of: json!({"photographs": [["a.jpg", 5, 1_763_877_641_123_u64]]}),
             ended_ms: 7,
             outcome: SetOutcome::Made(vec![below(panorama, Path::new("out"))]),
+            outdated: Vec::new(),
         };
         record.write(desk.path()).expect("written");
         assert_eq!(SetRecord::read(desk.path()).as_ref(), Some(&record));
         assert_eq!(record.panoramas()[0]["panorama"], "a/p.jpg");
         assert_eq!(record.panoramas()[0]["beside"]["project"], "a/p.json");
-        assert!(!record.files_are_there(desk.path()));
-        std::fs::create_dir(desk.path().join("a")).expect("a folder");
-        std::fs::write(desk.path().join("a/p.jpg"), "").expect("written");
-        assert!(record.files_are_there(desk.path()));
         let text = std::fs::read(desk.path().join(FILE)).expect("readable");
         std::fs::write(desk.path().join(FILE), &text[..text.len() / 2]).expect("written");
         assert_eq!(SetRecord::read(desk.path()), None);
@@ -197,5 +237,51 @@ mod tests {
             SetRecord::forget(desk.path()).expect("gone");
         }
         assert!(!desk.path().join(FILE).exists());
+    }
+
+    fn made(made_of: Value, panorama: Value) -> SetRecord {
+        let outcome = SetOutcome::Made(vec![panorama]);
+        SetRecord { set: "a".to_owned(), photographs: 2, made_of, ended_ms: 7, outcome, outdated: Vec::new() }
+    }
+
+    #[test]
+    fn a_panorama_that_is_cut_short_or_alone_is_not_whole() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let put = |name: &str, text: &str| std::fs::write(desk.path().join(name), text).expect("written");
+        let record = made(Value::Null, json!({"panorama": "p.jpg", "bytes": 4, "beside": {"project": "p.json"}}));
+        let is_whole = || record.files_are_whole(desk.path());
+        assert!(!is_whole(), "nothing is there");
+        put("p.jpg", "four");
+        assert!(!is_whole(), "the project is not there");
+        put("p.json", "{}");
+        assert!(is_whole());
+        for (text, whole) in [("", false), ("fou", false), ("four and a caption", true)] {
+            put("p.jpg", text);
+            assert_eq!(is_whole(), whole, "{text}");
+        }
+        put("p.json", "");
+        assert!(!is_whole(), "the project is empty");
+        let tiled = made(Value::Null, json!({"panorama": "p.dzi", "bytes": 4000}));
+        put("p.dzi", "xml");
+        assert!(!tiled.files_are_whole(desk.path()), "its tiles are gone");
+        std::fs::create_dir(desk.path().join("p_files")).expect("a folder");
+        assert!(tiled.files_are_whole(desk.path()));
+    }
+
+    #[test]
+    fn a_photograph_that_can_be_read_by_now_is_made_use_of() {
+        let photograph = |bytes: u64, is_unreadable: bool| match is_unreadable {
+            true => json!({"path": "x.jpg", "bytes": bytes, UNREADABLE: true}),
+            false => json!({"path": "x.jpg", "bytes": bytes}),
+        };
+        let made_of = |one: Value| json!({"options": ["a=1"], PHOTOGRAPHS: [one]});
+        let is_same = |before: Value, now: Value| made(made_of(before), Value::Null).is_of(&made_of(now));
+        assert!(is_same(photograph(5, false), photograph(5, false)));
+        assert!(!is_same(photograph(5, false), photograph(6, false)));
+        assert!(!is_same(photograph(5, true), photograph(5, false)), "it can be read by now");
+        assert!(is_same(photograph(5, true), photograph(5, true)));
+        assert!(is_same(photograph(5, false), photograph(5, true)), "it would only be missing");
+        let other = json!({"options": [], PHOTOGRAPHS: [photograph(5, false)]});
+        assert!(!made(made_of(photograph(5, false)), Value::Null).is_of(&other));
     }
 }

@@ -11,12 +11,16 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::provenance::seconds_taken;
 use trueup_io::source::{self, InMemory};
 
+use super::names;
+
 /// Folders within folders that are looked into: deeper ones are of no photographer's making.
 const DEEPEST: usize = 32;
 /// Fewer photographs make no panorama.
 const FEWEST: usize = 2;
+/// Why a name is of no use.
+const NO_UTF8: &str = "its name is no UTF-8";
 /// The name of the set in the folder itself.
-const ROOT: &str = ".";
+pub(super) const ROOT: &str = ".";
 
 /// Photographs that may make a panorama together.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,10 +48,11 @@ impl PhotographsOfFolder {
 /// folders are passed over, as are `except`, where panoramas are written, and pictures that say that they are panoramas. A
 /// folder's photographs are parted where nothing was taken for longer than `gap_seconds`, if all of them say when they were taken.
 ///
-/// A folder that cannot be read is passed over with the warning `folder-unreadable`.
+/// A folder that cannot be read is passed over with the warning `folder-unreadable`, a photograph whose name is no UTF-8 with
+/// `photograph-name-unreadable`. Where there are photographs in `except`, the warning `output-holds-photographs` says so.
 ///
 /// # Errors
-/// [`Error::Input`] if `root` is no folder; [`Error::Io`] if it cannot be read; [`Error::Cancelled`].
+/// [`Error::Input`] if `root` is no folder, or its name is no UTF-8; [`Error::Io`] if it cannot be read; [`Error::Cancelled`].
 pub(super) fn photograph_sets(
     root: &Path,
     except: &Path,
@@ -58,12 +63,19 @@ pub(super) fn photograph_sets(
         let hint = "Give the folder that holds the photographs, or folders of them.";
         return Err(Error::input(root.display(), "it is no folder", hint));
     }
+    // Photographs are told to the library by texts.
+    if root.to_str().is_none() {
+        return Err(Error::input(root.display(), NO_UTF8, "Rename it, or give it by another name."));
+    }
     let except = except.canonicalize().ok();
     let mut found = Vec::new();
     let mut folders = vec![Folder { path: root.to_owned(), names: Vec::new() }];
     while let Some(folder) = folders.pop() {
         context.check_cancelled()?;
         if except.is_some() && folder.path.canonicalize().ok() == except {
+            if let Some(photograph) = folder.some_photograph(context)? {
+                context.report(passed_over(&folder.path, &photograph));
+            }
             continue;
         }
         match folder.folders_within() {
@@ -75,7 +87,7 @@ pub(super) fn photograph_sets(
                 continue;
             }
         }
-        found.extend(folder.parts(gap_seconds));
+        found.extend(folder.parts(gap_seconds, context));
     }
     Ok(named(found))
 }
@@ -86,6 +98,26 @@ fn unreadable(folder: &Path, error: &std::io::Error) -> Diagnostic {
         Subject::file(folder.display()),
         format!("it is passed over: it cannot be read ({error})"),
         "Check its permissions and its name.",
+    )
+}
+
+/// Photographs are told to the library by texts: one that is called otherwise would not be found.
+fn without_name(photograph: &Path) -> Diagnostic {
+    Diagnostic::warning(
+        "photograph-name-unreadable",
+        Subject::file(photograph.display()),
+        format!("it is passed over: {NO_UTF8}"),
+        "Rename it.",
+    )
+}
+
+fn passed_over(output: &Path, photograph: &Path) -> Diagnostic {
+    let example = photograph.strip_prefix(output).unwrap_or(photograph).display();
+    Diagnostic::warning(
+        "output-holds-photographs",
+        Subject::file(output.display()),
+        format!("the photographs in it ({example}) are passed over, since the panoramas are written there"),
+        "Choose another folder for the panoramas.",
     )
 }
 
@@ -108,7 +140,7 @@ impl Folder {
     fn folders_within(&self) -> std::io::Result<Vec<Self>> {
         // Photographs are told to the library by texts.
         if self.path.to_str().is_none() {
-            return Err(std::io::Error::other("its name is no UTF-8"));
+            return Err(std::io::Error::other(NO_UTF8));
         }
         let mut found = Vec::new();
         for entry in std::fs::read_dir(&self.path)? {
@@ -123,10 +155,38 @@ impl Folder {
         Ok(found)
     }
 
-    /// The photographs right in it, parted by time.
-    fn parts(&self, gap_seconds: f64) -> Vec<Part> {
+    /// The photographs right in it. Folders and pipes may be called like photographs, and are none; a link that leads nowhere was
+    /// meant as one.
+    fn photographs(&self) -> Vec<PathBuf> {
         let mut photographs = source::files(&[self.path.display().to_string()], &InMemory::default());
-        photographs.retain(|path| !source::is_marked_panorama(path));
+        photographs.retain(|path| (path.is_file() || !path.exists()) && !source::is_marked_panorama(path));
+        photographs
+    }
+
+    /// A photograph in it or in a folder within that is not of a batch's making; `None` if there is none, or none that can be found.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    fn some_photograph(&self, context: &StageContext) -> Result<Option<PathBuf>> {
+        // Panoramas may have been written without metadata, by which they would be known.
+        let is_made = |path: &Path| path.file_name().and_then(|name| name.to_str()).is_some_and(names::is_of_set);
+        let mut folders = vec![Self { path: self.path.clone(), names: Vec::new() }];
+        while let Some(folder) = folders.pop() {
+            context.check_cancelled()?;
+            let Ok(within) = folder.folders_within() else { continue };
+            if let Some(photograph) = folder.photographs().into_iter().find(|path| !is_made(path)) {
+                return Ok(Some(photograph));
+            }
+            folders.extend(within.into_iter().rev().filter(|folder| !is_made(&folder.path)));
+        }
+        Ok(None)
+    }
+
+    /// The photographs right in it, parted by time.
+    fn parts(&self, gap_seconds: f64, context: &StageContext) -> Vec<Part> {
+        let (photographs, nameless): (Vec<_>, Vec<_>) =
+            self.photographs().into_iter().partition(|path| path.to_str().is_some());
+        nameless.iter().for_each(|path| context.report(without_name(path)));
         let taken: Option<Vec<f64>> = photographs.iter().map(|path| seconds_taken(path)).collect();
         let parts = match taken {
             Some(taken) => parted(&taken, gap_seconds),
@@ -233,5 +293,69 @@ mod tests {
         assert_eq!(found.iter().map(|set| set.name.as_str()).collect::<Vec<_>>(), ["good"]);
         let codes: Vec<String> = context.findings().into_iter().map(|one| one.code).collect();
         assert_eq!(codes, ["folder-unreadable"]);
+    }
+
+    /// Codes of what is found in a tree beside its sets, with what each is about.
+    fn found(root: &Path, output: &Path) -> (Vec<PhotographsOfFolder>, Vec<(String, String)>) {
+        let context = StageContext::default();
+        let sets = photograph_sets(root, output, 300.0, &context).expect("sets");
+        let none: &[&str] = &[];
+        let told = context.findings().into_iter().map(|one| (one.code.clone(), one.subject.named(none) + &one.message));
+        (sets, told.collect())
+    }
+
+    #[test]
+    fn a_folder_that_is_called_like_a_photograph_is_none() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room");
+        std::fs::create_dir_all(desk.path().join("x/a.jpg")).expect("a folder");
+        std::fs::create_dir(desk.path().join("b.jpg")).expect("a folder");
+        for name in ["00.jpg", "01.jpg"] {
+            std::fs::copy(room.join(name), desk.path().join("x").join(name)).expect("copied");
+        }
+        let (sets, _) = found(desk.path(), &desk.path().join("out"));
+        let counted: Vec<(&str, usize)> = sets.iter().map(|set| (set.name.as_str(), set.photographs.len())).collect();
+        assert_eq!(counted, [("x", 2)]);
+    }
+
+    #[test]
+    fn photographs_where_panoramas_are_written_are_told() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room");
+        let output = desk.path().join("day");
+        for folder in ["other", "day/set/panorama_files", "day/within"] {
+            std::fs::create_dir_all(desk.path().join(folder)).expect("a folder");
+        }
+        for copy in ["other/0.jpg", "day/set/panorama-1.jpg", "day/set/thumbnail.jpg", "day/set/panorama_files/0.jpg"] {
+            std::fs::copy(room.join("00.jpg"), desk.path().join(copy)).expect("copied");
+        }
+        let (sets, told) = found(desk.path(), &output);
+        assert_eq!(
+            (sets.len(), told.len()),
+            (1, 0),
+            "what a batch makes, even without metadata, is no photograph: {told:?}"
+        );
+        std::fs::copy(room.join("00.jpg"), output.join("within/0.jpg")).expect("copied");
+        let (sets, told) = found(desk.path(), &output);
+        assert_eq!((sets.len(), told.len()), (1, 1));
+        assert_eq!(told[0].0, "output-holds-photographs");
+        assert!(told[0].1.contains("day") && told[0].1.contains("0.jpg"), "{told:?}");
+    }
+
+    /// On Linux, file names are bytes.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_photograph_whose_name_is_no_text_is_told() {
+        use std::os::unix::ffi::OsStrExt;
+        let desk = tempfile::tempdir().expect("a folder");
+        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room/00.jpg");
+        for name in [&b"a.jpg"[..], b"b\xff.jpg"] {
+            std::fs::copy(&room, desk.path().join(std::ffi::OsStr::from_bytes(name))).expect("copied");
+        }
+        let (sets, told) = found(desk.path(), &desk.path().join("out"));
+        assert_eq!(sets[0].photographs, [desk.path().join("a.jpg")]);
+        assert_eq!(told.len(), 1);
+        assert_eq!(told[0].0, "photograph-name-unreadable");
+        assert!(told[0].1.contains(NO_UTF8), "{told:?}");
     }
 }

@@ -201,3 +201,84 @@ fn shards_share_all_sets_and_none_twice() {
     }
     assert!((0..10).all(|position| Shard::WHOLE.holds(position)));
 }
+
+/// A set whose folder takes nothing, one where the batch's own files lie and one where another set's do: they fail, and the others
+/// are made. In the next run, too.
+#[test]
+fn a_set_that_can_have_no_folder_fails_alone() {
+    let desk = tree(&["a", "b", "batch.csv", "b/panorama.jpg", "b/at-work"]);
+    let out = desk.path().join("out");
+    fs::create_dir(&out).expect("a folder");
+    fs::write(out.join("a"), "a file where the folder is to be").expect("written");
+    let context = StageContext::default();
+    for told in [5, 4] {
+        let batch = Batch::find(job(&desk), &context).expect("sets");
+        let heard = Mutex::new(0);
+        let tell = |_: &SetRecord| -> Result<()> {
+            *heard.lock().expect("whole") += 1;
+            Ok(())
+        };
+        batch.run(&options(), &tell, &context).expect("no set stops it");
+        assert_eq!(heard.into_inner().expect("whole"), told, "all but what is made already");
+        let records: Vec<SetRecord> = batch.records().collect();
+        let failed: Vec<&str> = records.iter().filter(|one| one.has_failed()).map(|one| one.set.as_str()).collect();
+        assert_eq!(failed, ["a", "b/at-work", "b/panorama.jpg", "batch.csv"]);
+        assert_eq!(records.len(), 5);
+        for record in records.iter().filter(|one| one.has_failed()) {
+            let SetOutcome::Failed { error, hint, .. } = &record.outcome else { panic!("it failed") };
+            assert!(error.contains(&record.set) && hint.ends_with('.'), "{error} {hint}");
+        }
+    }
+    assert!(out.join("b/panorama.jpg").is_file() && !out.join("batch.csv").exists());
+}
+
+#[test]
+fn a_panorama_that_was_cut_short_is_made_again() {
+    let desk = tree(&["a"]);
+    assert_eq!(run(job(&desk), &options()).expect("done"), ["a"]);
+    let whole = bytes(&desk, "a");
+    let again = || run(job(&desk), &options()).expect("done").len();
+    fs::write(desk.path().join("out/a/panorama.jpg"), &whole[..whole.len() / 2]).expect("written");
+    assert_eq!((again(), again()), (1, 0));
+    assert!(bytes(&desk, "a") == whole);
+    for file in ["panorama.json", "thumbnail.jpg"] {
+        fs::remove_file(desk.path().join("out/a").join(file)).expect("removed");
+        assert_eq!((again(), again()), (1, 0), "{file}");
+    }
+}
+
+#[test]
+fn what_an_earlier_attempt_made_is_told_from_what_is_made_now() {
+    let desk = tree(&["a"]);
+    let record = || SetRecord::read(&desk.path().join("out/a")).expect("a record");
+    run(job(&desk), &options()).expect("done");
+    assert!(record().outdated.is_empty());
+    run(BatchJob { extension: "png".to_owned(), ..job(&desk) }, &options()).expect("done");
+    assert_eq!(record().outdated, ["a/panorama.jpg"]);
+    for name in ["01.jpg", "02.jpg"] {
+        fs::remove_file(desk.path().join("in/a").join(name)).expect("removed");
+    }
+    run(job(&desk), &options()).expect("done");
+    assert_eq!((record().outcome, record().outdated.len()), (SetOutcome::Alone, 2));
+}
+
+/// The folder of the batch is that of the set in the root of the tree: what others write there stays, what a killed program left
+/// goes.
+#[test]
+fn what_was_half_written_in_the_folder_of_the_batch_goes() {
+    let desk = tree(&[""]);
+    let out = desk.path().join("out");
+    drop(Claim::take(&out).expect("possible").expect("nobody has it"));
+    let left = out.join(".trueup-left.part");
+    fs::write(&left, "half").expect("written");
+    assert_eq!(run(job(&desk), &options()).expect("done"), ["."]);
+    assert!(!left.exists());
+}
+
+#[test]
+fn a_file_where_the_folder_for_the_panoramas_is_to_be_is_refused() {
+    let desk = tree(&["a"]);
+    fs::write(desk.path().join("out"), "a file").expect("written");
+    let refused = run(job(&desk), &options()).expect_err("it is no folder").to_string();
+    assert!(refused.contains("it is no folder, but a file") && refused.contains("another folder"), "{refused}");
+}

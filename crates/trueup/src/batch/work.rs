@@ -2,10 +2,14 @@
 
 use std::any::Any;
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::ErrorKind;
 use std::num::NonZeroUsize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use serde_json::{Value, json};
 use trueup_core::diagnostics::{Diagnostic, Subject};
@@ -13,17 +17,18 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode;
 
 use super::claim::Claim;
-use super::record::{SetOutcome, SetRecord, below, milliseconds, now_ms};
+use super::names::{self, PANORAMA};
+use super::record::{PHOTOGRAPHS, SetOutcome, SetRecord, UNREADABLE, below, milliseconds, now_ms};
 use super::{Batch, PhotographsOfFolder};
 use crate::job::inputs::Inputs;
 use crate::job::{Outputs, SideOutput, StitchJob};
 use crate::options::StitchOptions;
 use crate::pipeline::memory_of_each;
 
-/// What a set's panorama is called in its folder, without extension.
-const PANORAMA: &str = "panorama";
 /// A set that was begun so many times without an end is not begun again: it kills the program, most likely by the memory it takes.
 const MOST_UNENDED: u64 = 5;
+/// How long another program may take at most from making a temporary file to marking it as its own: a thousand times what it does.
+const MARKED_WITHIN: Duration = Duration::from_secs(1);
 
 /// What came of looking at a set.
 pub(super) enum Attempt {
@@ -55,13 +60,14 @@ impl<'a> Work<'a> {
     /// Checks what holds for all sets, and makes the folder for them.
     ///
     /// # Errors
-    /// [`Error::Options`]; [`Error::Unsupported`] if the format is none, or has not what is asked of it; [`Error::Io`].
+    /// [`Error::Options`]; [`Error::Unsupported`] if the format is none, or has not what is asked of it; [`Error::Input`] if the
+    /// folder cannot be made.
     pub(super) fn new(batch: &'a Batch, options: &StitchOptions) -> Result<Self> {
         options.validate()?;
         let job = &batch.job;
         let name = PathBuf::from(format!("{PANORAMA}.{}", job.extension));
         encode::check_format(&name, &options.compose.output)?;
-        std::fs::create_dir_all(&job.output).map_err(|error| Error::io("making", &job.output, error))?;
+        make_output(&job.output)?;
         let at_once = job.at_once.clamp(1, batch.positions().count().max(1));
         let mut for_one = options.clone();
         for_one.run.resources.memory = memory_of_each(options.run.resources.memory, at_once);
@@ -94,19 +100,46 @@ impl<'a> Work<'a> {
         self.batch.sets[position].folder_in(&self.batch.job.output)
     }
 
-    /// Does the set at this position, if it is to be done and nobody else is at it.
+    /// Does the set at this position, if it is to be done and nobody else is at it. One whose folder takes nothing failed: its
+    /// record is kept by the batch alone.
     ///
     /// # Errors
-    /// [`Error::Cancelled`], and those of keeping records.
+    /// [`Error::Cancelled`], and [`Error::Io`] where no set could be kept.
     pub(super) fn attempt(&self, position: usize, context: &StageContext) -> Result<Attempt> {
-        let (set, folder) = (&self.batch.sets[position], self.folder_of(position));
+        let set = &self.batch.sets[position];
         let made_of = self.made_of(set);
-        if self.is_done(position, &made_of) && !Claim::is_begun(&folder) {
+        let outcome = match self.refusal(set) {
+            Some(refusal) => SetOutcome::failed(&refusal),
+            None => match self.attempt_in_folder(position, &made_of, context) {
+                Err(error) if !concerns_all(&error) => unkeepable(&error),
+                done => return done,
+            },
+        };
+        let record = self.record(position, made_of, outcome);
+        self.batch.unkept.lock().unwrap_or_else(PoisonError::into_inner).insert(position, record.clone());
+        Ok(Attempt::Done(record))
+    }
+
+    /// Why a set can have no folder: files of the batch are called as its folder would be.
+    fn refusal(&self, set: &PhotographsOfFolder) -> Option<Error> {
+        let place = names::place_of_a_file(&set.name, |name| self.batch.has_set(name))?;
+        let place = self.batch.job.output.join(place);
+        let reason = "its folder would lie here, where the batch writes a file of its own";
+        Some(Error::input(place.display(), reason, "Rename the folder of its photographs."))
+    }
+
+    /// Does the set at this position in its folder, if it is to be done and nobody else is at it.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`], and those of making the folder and keeping the record.
+    fn attempt_in_folder(&self, position: usize, made_of: &Value, context: &StageContext) -> Result<Attempt> {
+        let (set, folder) = (&self.batch.sets[position], self.folder_of(position));
+        if self.is_done(position, made_of) && !Claim::is_begun(&folder) {
             return Ok(Attempt::WasDone);
         }
         let Some(claim) = Claim::take(&folder)? else { return Ok(Attempt::Elsewhere) };
         // Another program may have done it in between, or been killed as soon as it was done.
-        if self.is_done(position, &made_of) {
+        if self.is_done(position, made_of) {
             claim.release();
             return Ok(Attempt::WasDone);
         }
@@ -114,24 +147,36 @@ impl<'a> Work<'a> {
             context.report(without_locks(&self.batch.job.output));
         }
         let done = self.outcome(set, &folder, &claim, context).and_then(|outcome| {
-            let record = SetRecord {
-                set: set.name.clone(),
-                photographs: set.photographs.len(),
-                made_of,
-                ended_ms: now_ms(),
-                outcome,
-            };
+            let record = self.record(position, made_of.clone(), outcome);
             record.write(&folder).map(|()| record)
         });
         claim.release();
         done.map(Attempt::Done)
     }
 
+    /// What is to be kept of a set now.
+    fn record(&self, position: usize, made_of: Value, outcome: SetOutcome) -> SetRecord {
+        let (set, output) = (&self.batch.sets[position], &self.batch.job.output);
+        let shown = |path: PathBuf| path.strip_prefix(output).unwrap_or(&path).display().to_string();
+        let mut record = SetRecord {
+            set: set.name.clone(),
+            photographs: set.photographs.len(),
+            made_of,
+            ended_ms: now_ms(),
+            outcome,
+            outdated: names::panoramas_in(&self.folder_of(position)).into_iter().map(shown).collect(),
+        };
+        let current: Vec<String> =
+            record.panoramas().iter().filter_map(|one| one["panorama"].as_str().map(str::to_owned)).collect();
+        record.outdated.retain(|file| !current.contains(file));
+        record
+    }
+
     /// Whether a set need not be stitched again.
     fn is_done(&self, position: usize, made_of: &Value) -> bool {
         let Some(record) = SetRecord::read(&self.folder_of(position)) else { return false };
         let is_tried_again = self.failed_before.get(&position) == Some(&record.ended_ms);
-        !is_tried_again && record.made_of == *made_of && record.files_are_there(&self.batch.job.output)
+        !is_tried_again && record.is_of(made_of) && record.files_are_whole(&self.batch.job.output)
     }
 
     /// What decides the panoramas of a set: the program, the options and the photographs as they lie on the disk. Where the
@@ -140,14 +185,20 @@ impl<'a> Work<'a> {
         let photograph = |path: &PathBuf| {
             let metadata = std::fs::metadata(path).ok();
             let modified = metadata.as_ref().and_then(|metadata| metadata.modified().ok());
-            json!({
+            // Its permissions are no part of what it is; whether they let it be read is.
+            let is_unreadable = metadata.as_ref().is_some_and(std::fs::Metadata::is_file) && File::open(path).is_err();
+            let mut photograph = json!({
                 "path": path.strip_prefix(&self.batch.job.folder).unwrap_or(path).display().to_string(),
                 "bytes": metadata.map(|metadata| metadata.len()),
                 "modified_ms": modified.map(milliseconds),
-            })
+            });
+            if is_unreadable {
+                photograph[UNREADABLE] = true.into();
+            }
+            photograph
         };
         let mut made_of = self.decided_by.clone();
-        made_of["photographs"] = set.photographs.iter().map(photograph).collect();
+        made_of[PHOTOGRAPHS] = set.photographs.iter().map(photograph).collect();
         made_of
     }
 
@@ -163,10 +214,7 @@ impl<'a> Work<'a> {
         context: &StageContext,
     ) -> Result<SetOutcome> {
         SetRecord::forget(folder)?;
-        // In the folder of the batch itself, other programs write what they sum up.
-        if folder != self.batch.job.output {
-            encode::clear_parts(folder);
-        }
+        self.clear_parts(folder, claim);
         if set.is_alone() {
             return Ok(SetOutcome::Alone);
         }
@@ -182,12 +230,23 @@ impl<'a> Work<'a> {
         }
     }
 
+    /// Takes away what was half written when a program was killed at this set.
+    fn clear_parts(&self, folder: &Path, claim: &Claim) {
+        if folder != self.batch.job.output {
+            encode::clear_parts(folder, Duration::ZERO);
+        } else if claim.unended > 0 {
+            // In the folder of the batch itself, other programs write what they sum up: what is theirs is marked soon.
+            std::thread::sleep(MARKED_WITHIN);
+            encode::clear_parts(folder, MARKED_WITHIN);
+        }
+    }
+
     /// Stitches a set; returns the summaries of its panoramas.
     fn stitch(&self, set: &PhotographsOfFolder, folder: &Path, context: &StageContext) -> Result<Vec<Value>> {
         let job = &self.batch.job;
         let outputs = Outputs::new(folder.join(format!("{PANORAMA}.{}", job.extension)))
-            .with(SideOutput::Project, folder.join(format!("{PANORAMA}.json")))
-            .with(SideOutput::Thumbnail, folder.join("thumbnail.jpg"));
+            .with(SideOutput::Project, folder.join(names::project()))
+            .with(SideOutput::Thumbnail, folder.join(names::thumbnail()));
         let photographs = set.photographs.iter().map(|path| path.display().to_string());
         let inputs = Inputs { all: true, ..Inputs::new(photographs) };
         // Findings are a set's own, and so is progress where there is one at a time.
@@ -195,6 +254,45 @@ impl<'a> Work<'a> {
         let written = StitchJob { inputs, outputs, cache: None, threads: self.threads }.run(&self.options, &own)?;
         Ok(written.iter().map(|one| below(one.summary(), &job.output)).collect())
     }
+}
+
+/// Makes the folder for the panoramas, if it is not there.
+///
+/// # Errors
+/// [`Error::Input`] if there is a file of its name, or the operating system refuses.
+fn make_output(output: &Path) -> Result<()> {
+    let hint = "Choose another folder for the panoramas.";
+    if output.exists() && !output.is_dir() {
+        return Err(Error::input(output.display(), "it is no folder, but a file", hint));
+    }
+    std::fs::create_dir_all(output).map_err(|error| match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Error::io("making", output, error),
+        _ => Error::input(output.display(), format!("this folder cannot be made ({error})"), hint),
+    })
+}
+
+/// Whether an error would come at every set: a stop, a disk that takes nothing more.
+fn concerns_all(error: &Error) -> bool {
+    match error {
+        Error::Cancelled => true,
+        Error::Io { source, .. } => {
+            matches!(source.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::ReadOnlyFilesystem)
+        }
+        _ => false,
+    }
+}
+
+/// A set of which nothing can be kept.
+fn unkeepable(error: &Error) -> SetOutcome {
+    let mut outcome = SetOutcome::failed(error);
+    if let SetOutcome::Failed { hint, may_pass, .. } = &mut outcome {
+        *may_pass = true;
+        if hint.is_empty() {
+            "Check the permissions of the set's folder there, and whether something else has its name."
+                .clone_into(hint);
+        }
+    }
+    outcome
 }
 
 /// What decides panoramas beside the photographs: options that say how the work is done do not.
