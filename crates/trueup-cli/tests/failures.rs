@@ -50,6 +50,20 @@ fn a_photograph_of_eight_pixels() {
         .expect_failure(1, &["dot.jpg: 8 x 8 px are too few to stitch, each side needs 16"]);
 }
 
+/// Beside the program's own photographs lies one whose name is none of text: a pattern and its folder find the others; named, it is named in the answer.
+#[cfg(target_os = "linux")]
+#[test]
+fn names_that_are_not_utf8() {
+    use std::os::unix::ffi::OsStrExt;
+    let desk = street_desk();
+    let name = std::ffi::OsStr::from_bytes(b"n\xff.txt");
+    std::fs::write(desk.path().join(name), "no picture").expect("written");
+    desk.stitch(&["*.jpg"]).expect_success();
+    let mut named = trueup(desk.path(), &["stitch", "-o", "z.jpg"]);
+    named.arg(name);
+    finish(named).expect_failure(2, &["the name \"n\u{fffd}.txt\" is not UTF-8; rename it"]);
+}
+
 #[test]
 fn missing_files_folders_and_patterns() {
     let desk = Desk::new();
@@ -223,7 +237,8 @@ fn project_files_that_are_none() {
     inspect("noise.json")
         .expect_failure(1, &["noise.json: not a project file", "that `trueup stitch --project` wrote"]);
     inspect("other.json").expect_failure(1, &["other.json: its format is not \"trueup-project\""]);
-    inspect("later.json").expect_failure(1, &["later.json: its version is 99, this program reads versions 1 to 2"]);
+    inspect("later.json")
+        .expect_failure(1, &["later.json: its version is 99, this program reads versions 1 to 2", "or a later one"]);
     inspect("damaged.json").expect_failure(1, &["damaged.json: the project is damaged ("]);
     inspect("none.json").expect_failure(1, &["reading none.json: No such file or directory"]);
     inspect(".").expect_failure(1, &[".: it is a folder", "that `trueup stitch --project` wrote"]);

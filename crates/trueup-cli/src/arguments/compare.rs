@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::NonEmptyStringValueParser;
 
 use super::option_flags::TypedOptions;
-use super::shared::{GeometryArgs, MaskArgs, TuningArgs, photographs_help};
+use super::shared::{GeometryArgs, MaskArgs, PhotographsParser, TuningArgs, photographs_help};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -24,7 +23,7 @@ The folder appears when it is complete. An older comparison of that name is repl
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CompareArgs {
     /// What the photographs are named by.
-    #[arg(value_name = "PHOTOS", help = photographs_help(), required_unless_present = "tally", value_parser = NonEmptyStringValueParser::new())]
+    #[arg(value_name = "PHOTOS", help = photographs_help(), required_unless_present = "tally", value_parser = PhotographsParser)]
     pub photographs: Vec<String>,
 
     /// The folder to write

@@ -1,8 +1,11 @@
 //! Arguments that several commands have.
 
+use std::ffi::OsStr;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::builder::{NonEmptyStringValueParser, TypedValueParser};
+use clap::error::ErrorKind;
+use clap::{Arg, Args, Command};
 
 use super::side_outputs::SideOutputArgs;
 
@@ -13,6 +16,23 @@ const MAX_THREADS: i64 = 1024;
 pub(crate) fn photographs_help() -> String {
     let formats = trueup::readable_formats();
     format!("Files, folders (their photographs, not those of folders inside) or glob patterns; {formats}")
+}
+
+/// Takes the name of a photograph, a folder or a pattern, and says which one cannot be taken.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PhotographsParser;
+
+impl TypedValueParser for PhotographsParser {
+    type Value = String;
+
+    fn parse_ref(&self, command: &Command, argument: Option<&Arg>, value: &OsStr) -> Result<String, clap::Error> {
+        if value.to_str().is_none() {
+            let name = value.display();
+            let reason = format!("the name \"{name}\" is not UTF-8; rename it, or give the folder it lies in");
+            return Err(command.clone().error(ErrorKind::InvalidUtf8, reason));
+        }
+        NonEmptyStringValueParser::new().parse_ref(command, argument, value)
+    }
 }
 
 fn panorama_help() -> String {

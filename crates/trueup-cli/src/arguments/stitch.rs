@@ -1,10 +1,9 @@
 //! What may be typed after `trueup stitch`.
 
 use clap::Args;
-use clap::builder::NonEmptyStringValueParser;
 
 use super::option_flags::TypedOptions;
-use super::shared::{FileArgs, GeometryArgs, MaskArgs, MessageArgs, TuningArgs, photographs_help};
+use super::shared::{FileArgs, GeometryArgs, MaskArgs, MessageArgs, PhotographsParser, TuningArgs, photographs_help};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -26,7 +25,7 @@ once.";
 #[command(after_help = EXAMPLES)]
 pub(crate) struct StitchArgs {
     /// What the photographs are named by.
-    #[arg(value_name = "PHOTOS", help = photographs_help(), required = true, value_parser = NonEmptyStringValueParser::new())]
+    #[arg(value_name = "PHOTOS", help = photographs_help(), required = true, value_parser = PhotographsParser)]
     pub photographs: Vec<String>,
 
     #[command(flatten)]

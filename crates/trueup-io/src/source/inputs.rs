@@ -9,6 +9,7 @@ use trueup_core::raster::Photograph;
 use crate::formats::{names_photograph, readable_formats};
 
 use super::in_memory::InMemory;
+use super::pattern;
 use super::rejection::Rejection;
 
 /// A file to look into, or an input that already failed.
@@ -45,7 +46,7 @@ pub(super) fn expand_one(input: &str) -> Vec<Candidate> {
     match std::fs::metadata(&path) {
         Ok(metadata) if metadata.is_dir() => expand_folder(path),
         Ok(_) => vec![Candidate::File(path)],
-        Err(_) if input.contains(['*', '?', '[']) => expand_pattern(input),
+        Err(_) if input.contains(pattern::WILDCARDS) => expand_pattern(input),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
             let rejection = Rejection::new("file-missing", "there is no such file or folder", "Check the path.");
             vec![Candidate::Rejected(path, rejection)]
@@ -83,19 +84,17 @@ fn expand_folder(folder: PathBuf) -> Vec<Candidate> {
 }
 
 fn expand_pattern(pattern: &str) -> Vec<Candidate> {
-    let options =
-        glob::MatchOptions { case_sensitive: true, require_literal_separator: true, require_literal_leading_dot: true };
     let reject = |code, reason, hint: &str| {
         vec![Candidate::Rejected(PathBuf::from(pattern), Rejection::new(code, reason, hint))]
     };
-    let matches = match glob::glob_with(pattern, options) {
+    let matches = match pattern::matches(pattern) {
         Ok(matches) => matches,
         Err(error) => {
             let reason = format!("there is no such file, and as a pattern it is malformed ({error})");
             return reject("pattern-without-match", reason, "Check the path; a literal [ is written [[] in a pattern.");
         }
     };
-    let candidates = photographs_in_natural_order(matches.filter_map(Result::ok));
+    let candidates = photographs_in_natural_order(matches.into_iter());
     if candidates.is_empty() {
         let reason = format!("no {} file matches the pattern", readable_formats());
         return reject(
@@ -120,6 +119,6 @@ pub fn natural_order(a: &Path, b: &Path) -> Ordering {
     natord::compare_ignore_case(&a_text, &b_text).then_with(|| a.cmp(b))
 }
 
-fn is_hidden(path: &Path) -> bool {
+pub(super) fn is_hidden(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
 }

@@ -6,6 +6,7 @@ mod inputs;
 mod names;
 mod opened;
 mod options;
+mod pattern;
 mod rejection;
 #[cfg(test)]
 mod tests;

@@ -467,6 +467,8 @@ impl Project {
         let wrong = |reason: String| {
             trueup_core::Error::input(file, reason, "Give a file that `trueup stitch --project` wrote.")
         };
+        // Editors of some systems begin a text with a mark of its byte order.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut value: serde_json::Value =
             serde_json::from_str(text).map_err(|error| wrong(format!("not a project file ({error})")))?;
         if value.get("format").and_then(serde_json::Value::as_str) != Some(PROJECT_FORMAT) {
@@ -475,7 +477,15 @@ impl Project {
         let version = value.get("version").and_then(serde_json::Value::as_u64);
         if !version.is_some_and(|version| (1..=u64::from(PROJECT_VERSION)).contains(&version)) {
             let found = version.map_or("unknown".to_owned(), |version| version.to_string());
-            return Err(wrong(format!("its version is {found}, this program reads versions 1 to {PROJECT_VERSION}")));
+            let reason = format!("its version is {found}, this program reads versions 1 to {PROJECT_VERSION}");
+            return Err(match version {
+                Some(1..) => trueup_core::Error::input(
+                    file,
+                    reason,
+                    "Read it with the version of trueup that wrote it, or a later one.",
+                ),
+                _ => wrong(reason),
+            });
         }
         if let Some(options) = value.get_mut("options") {
             StitchOptions::update_recorded(options, file)?;

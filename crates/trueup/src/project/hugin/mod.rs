@@ -56,7 +56,8 @@ impl Attitude {
 /// the matches, which the record does not hold: `cpfind` of Hugin finds such again.
 ///
 /// # Errors
-/// [`Error::Input`] where the record has no cameras, they show a flat scene from many places, or a photograph's orientation mirrors it.
+/// [`Error::Input`] where the record has no cameras, they show a flat scene from many places, a photograph's orientation mirrors it, or its path
+/// holds what ends a name there.
 pub fn hugin_project(project: &Project) -> Result<String> {
     let missing =
         || Error::input("Hugin project", "the panorama has no cameras", "Stitch at least two overlapping photographs.");
@@ -90,6 +91,10 @@ pub fn hugin_project(project: &Project) -> Result<String> {
 }
 
 fn image_line(image: &ImageRecord, camera_from_level: &Matrix3<f64>, focal_px: f64) -> Result<String> {
+    if image.path.contains(['"', '\n', '\r']) {
+        let reason = "its name holds a quotation mark or a line break, which ends it in a Hugin project";
+        return Err(Error::input(&image.path, reason, "Rename it and stitch again."));
+    }
     let quarter_turns: u8 = match image.orientation {
         0 | 1 => 0,
         6 => 1,
@@ -333,6 +338,15 @@ mod tests {
             let [written, read] = [(lens.terms, 670.0), (upright.terms, *focal_px)]
                 .map(|(terms, focal_px)| focal_px * Lens::new(terms).place(ray).expect("in front").x);
             assert!((written - read).abs() < 0.3, "{step}: {written} {read}");
+        }
+    }
+
+    #[test]
+    fn names_that_end_early_are_refused() {
+        for name in ["a\".jpg", "a\n.jpg"] {
+            let record = super::super::fill::left_out_record(name.to_owned(), String::new(), String::new());
+            let refused = image_line(&record, &Matrix3::identity(), 670.0).expect_err("not readable").to_string();
+            assert!(refused.contains("ends it in a Hugin project"), "{refused}");
         }
     }
 

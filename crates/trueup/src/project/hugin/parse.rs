@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use trueup_core::{Error, Result};
 
 /// What may be done about a file that is none.
-const AS_SAVED: &str = "Give a project that Hugin saved, or `trueup stitch --hugin` wrote.";
+const AS_SAVED: &str = "Give a project that Hugin saved, or `trueup stitch --pto` wrote.";
 
 /// One line: what each of its fields says, by its name.
 #[derive(Debug, Clone, PartialEq)]
