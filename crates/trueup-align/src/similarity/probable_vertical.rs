@@ -52,14 +52,16 @@ pub(super) fn probable_vertical(vote: &LineVote, level: &CameraLevel<'_>) -> Opt
     }
     let logarithm =
         |down: &Vector3<f64>| INDEPENDENT * log_likelihood(&sights, down) - 0.5 * level.deviations_to(down).powi(2);
+    // How probable each vertical is beside the most probable one, as a logarithm.
+    let beside_best = |verticals: &[Vector3<f64>]| -> Vec<f64> {
+        let logarithms: Vec<f64> = verticals.par_iter().map(logarithm).collect();
+        let most = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        logarithms.into_iter().map(|logarithm| logarithm - most).collect()
+    };
     let coarse = cone(&level.down, SEARCH_DEG.to_radians(), STEP_DEG.to_radians());
-    let logarithms: Vec<f64> = coarse.par_iter().map(logarithm).collect();
-    let most = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let probable = coarse.iter().zip(&logarithms).filter(|(_, logarithm)| **logarithm > most - IMPROBABLE);
+    let probable = coarse.iter().zip(beside_best(&coarse)).filter(|(_, logarithm)| *logarithm > -IMPROBABLE);
     let fine: Vec<Vector3<f64>> = probable.flat_map(|(down, _)| around(down)).collect();
-    let logarithms: Vec<f64> = fine.par_iter().map(logarithm).collect();
-    let most = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = logarithms.iter().map(|logarithm| (logarithm - most).exp()).collect();
+    let weights: Vec<f64> = beside_best(&fine).into_iter().map(f64::exp).collect();
     let sum: Vector3<f64> = fine.iter().zip(&weights).map(|(down, weight)| down * *weight).sum();
     let down = sum.try_normalize(f64::MIN_POSITIVE)?;
     let basis = tangent_basis(&down);

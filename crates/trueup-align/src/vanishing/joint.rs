@@ -137,30 +137,27 @@ impl LineVote {
 
     /// Normals in the common frame and weights of about `most` segments, the longest of every photograph.
     pub(crate) fn longest(&self, most: usize) -> Vec<(Vector3<f64>, f64)> {
-        let of_each = most.div_ceil(self.photographs.len().max(1));
-        let of_photograph = |photograph: &PhotographLines| -> Vec<(Vector3<f64>, f64)> {
-            let normals = photograph.planes.normals.iter().take(of_each);
-            normals
-                .zip(&photograph.planes.weights)
-                .map(|(normal, &weight)| (photograph.rotation.tr_mul(normal), weight))
-                .collect()
+        let of_line = |(PhotographLines { rotation, planes }, line): (&PhotographLines, usize)| {
+            (rotation.tr_mul(&planes.normals[line]), planes.weights[line])
         };
-        self.photographs.iter().flat_map(of_photograph).collect()
+        self.longest_of_each(most).map(of_line).collect()
     }
 
-    /// About `most` segments as seen in the common frame, the longest of every photograph.
+    /// The same segments as seen in the common frame.
     pub(crate) fn sights(&self, most: usize) -> Vec<Sight> {
-        let of_each = most.div_ceil(self.photographs.len().max(1));
-        let of_photograph = |photograph: &PhotographLines| -> Vec<Sight> {
-            let PhotographLines { rotation, planes } = photograph;
-            let sight = |line: usize| Sight {
-                normal: rotation.tr_mul(&planes.normals[line]),
-                toward: rotation.tr_mul(&planes.toward(line)),
-                length_px: planes.lengths[line],
-            };
-            (0..planes.len().min(of_each)).map(sight).collect()
+        let of_line = |(PhotographLines { rotation, planes }, line): (&PhotographLines, usize)| Sight {
+            normal: rotation.tr_mul(&planes.normals[line]),
+            toward: rotation.tr_mul(&planes.toward(line)),
+            length_px: planes.lengths[line],
         };
-        self.photographs.iter().flat_map(of_photograph).collect()
+        self.longest_of_each(most).map(of_line).collect()
+    }
+
+    /// About `most` segments, shared out evenly among the photographs, whose longest come first.
+    fn longest_of_each(&self, most: usize) -> impl Iterator<Item = (&PhotographLines, usize)> {
+        let of_each = most.div_ceil(self.photographs.len().max(1));
+        let of_photograph = move |photograph| (0..of_each).map(move |line| (photograph, line));
+        self.photographs.iter().flat_map(of_photograph).filter(|(photograph, line)| *line < photograph.planes.len())
     }
 
     /// The sum of the segments' weights.
