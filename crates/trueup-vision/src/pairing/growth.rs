@@ -9,6 +9,7 @@ use trueup_core::geometry::Homography;
 use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 
+use super::ordered;
 use crate::matching::PredictedOverlap;
 
 /// Places along each side of a photograph, from border to border, that are asked whether the other shows them.
@@ -144,7 +145,7 @@ impl Prediction<'_> {
 
     /// The pair if it was not tried and enough of one photograph is predicted to be in the other.
     fn predicted(&self, from: usize, to: usize, to_from_from: Matrix3<f64>) -> Option<PredictedPair> {
-        let pair = (from.min(to), from.max(to));
+        let pair = ordered(from, to);
         if from == to || self.tried.contains(&pair) {
             return None;
         }
