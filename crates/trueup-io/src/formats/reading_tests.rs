@@ -216,3 +216,28 @@ fn files_that_are_cut_off_are_refused() {
         check_cut_off(whole);
     }
 }
+
+/// Some cameras and editors leave them; other programs read such files.
+#[test]
+fn bytes_between_the_segments_of_a_jpeg_harm_nothing() {
+    /// Of a marker that is none, and beyond what the decoder takes as fill bytes.
+    const STRAY: [u8; 7] = [0, 0, 0xff, 0, 0x12, 0, 0];
+    /// The start-of-image marker, and the JFIF segment behind it.
+    const BEFORE: usize = 2 + 2 + 16;
+    let samples: Vec<u8> =
+        (0..WIDTH * HEIGHT).flat_map(|at| [0, 1, 2].map(|c| level(at % WIDTH, at / WIDTH, c))).collect();
+    for progressive in [false, true] {
+        let mut bytes = Vec::new();
+        let mut encoder = jpeg_encoder::Encoder::new(&mut bytes, 90);
+        encoder.set_progressive(progressive);
+        encoder.encode(&samples, WIDTH as u16, HEIGHT as u16, jpeg_encoder::ColorType::Rgb).expect("to memory");
+        let (_kept, _, plain) = read(&bytes);
+        let (_kept, _, padded) = read(&[&bytes[..BEFORE], &STRAY, &bytes[BEFORE..]].concat());
+        assert_eq!(padded, plain, "progressive: {progressive}");
+        // What lacks its end is still told.
+        let cut = [&bytes[..BEFORE], &STRAY, &bytes[BEFORE..bytes.len() * 3 / 4]].concat();
+        let (_kept, mut sources) = scanned(&cut);
+        let said = photograph(&sources.photographs.remove(0)).expect_err("cut off").to_string();
+        assert!(said.contains("cut off"), "{said}");
+    }
+}

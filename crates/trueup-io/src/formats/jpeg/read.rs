@@ -10,7 +10,7 @@ use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 
-use super::scans::{has_separate_subsampled_scans, is_one_scan};
+use super::scans::{has_end_of_image, has_separate_subsampled_scans, is_one_scan};
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::decoded::{MAX_PIXEL_BYTES, check_unchanged, damaged};
 use crate::metadata::embedded;
@@ -20,14 +20,19 @@ use crate::metadata::pose::stated_pose;
 /// Largest width and height a JPEG can state (ITU-T T.81 table B.2).
 const JPEG_MAX_SIDE: usize = 65_535;
 
-/// Strict decoding: a file that is damaged is refused, never filled up with gray.
-fn options() -> DecoderOptions {
-    DecoderOptions::default().set_strict_mode(true).set_max_width(JPEG_MAX_SIDE).set_max_height(JPEG_MAX_SIDE)
+/// Headers as cameras and editors write them: some leave bytes between segments that are no markers, which harms no pixel.
+fn header_options() -> DecoderOptions {
+    DecoderOptions::default().set_strict_mode(false).set_max_width(JPEG_MAX_SIDE).set_max_height(JPEG_MAX_SIDE)
+}
+
+/// Strict decoding of what follows the headers: pixels that are damaged are refused, never filled up with gray.
+fn pixel_options() -> DecoderOptions {
+    header_options().set_strict_mode(true)
 }
 
 /// What the header states of the pixels.
 pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
-    let mut decoder = JpegDecoder::new_with_options(input, options());
+    let mut decoder = JpegDecoder::new_with_options(input, header_options());
     decoder.decode_headers().map_err(|error| HeaderError::Damaged(format!("{error:?}")))?;
     let (width, height) = decoder.dimensions().ok_or_else(|| HeaderError::damaged("no frame header"))?;
     Ok(StoredPixels { width, height, bits: 8, is_float: false })
@@ -35,7 +40,7 @@ pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, Hea
 
 /// The ICC profile.
 pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
-    let mut decoder = JpegDecoder::new_with_options(input, options());
+    let mut decoder = JpegDecoder::new_with_options(input, header_options());
     decoder.decode_headers().ok()?;
     decoder.icc_profile()
 }
@@ -52,7 +57,7 @@ pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
 
 /// The XMP packet.
 fn xmp(input: &mut Input) -> Option<Vec<u8>> {
-    let mut decoder = JpegDecoder::new_with_options(input, options());
+    let mut decoder = JpegDecoder::new_with_options(input, header_options());
     decoder.decode_headers().ok()?;
     decoder.xmp().cloned()
 }
@@ -65,7 +70,7 @@ pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograp
 }
 
 pub(super) fn decode(source: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options());
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), header_options());
     decoder.decode_headers().map_err(|error| damaged(source, format!("{error:?}")))?;
     let (width, height) = decoder.dimensions().ok_or_else(|| damaged(source, "no frame header"))?;
     check_unchanged(source, width, height)?;
@@ -85,7 +90,7 @@ pub(super) fn decode(source: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
         Some(ColorSpace::Luma) => (ColorSpace::Luma, 1),
         _ => (ColorSpace::RGB, 3),
     };
-    decoder.set_options(options().jpeg_set_out_colorspace(space));
+    decoder.set_options(pixel_options().jpeg_set_out_colorspace(space));
     let pixels = decoder.decode().map_err(|error| damaged(source, format!("{error:?}")))?;
     Ok(Photograph::Eight(Raster::from_data(width, height, channels, pixels)?))
 }
@@ -127,30 +132,4 @@ fn decode_separate_scans(source: &SourceImage, bytes: &[u8], width: usize, heigh
         Some(jpeg_decoder::PixelFormat::RGB24) => Ok(Photograph::Eight(Raster::from_data(width, height, 3, pixels)?)),
         _ => Err(Error::input(&source.name, "its kind of pixels is not read", "Export it as an RGB JPEG.")),
     }
-}
-
-/// Whether an end-of-image marker follows the first scan header. The thumbnail's own marker lies before that, in EXIF;
-/// within a scan every 0xff of the data is followed by 0 or by a restart marker; and further pictures or maker data may
-/// follow the end.
-///
-/// # Source
-/// ITU-T T.81 B.1.1.2 to B.1.1.5.
-fn has_end_of_image(bytes: &[u8]) -> bool {
-    const START_OF_SCAN: u8 = 0xda;
-    const END_OF_IMAGE: u8 = 0xd9;
-    let mut rest = bytes.get(2..).unwrap_or_default();
-    while let [0xff, marker, after @ ..] = rest {
-        match *marker {
-            START_OF_SCAN => return after.windows(2).any(|pair| pair == [0xff, END_OF_IMAGE]),
-            // Fill bytes may precede a marker; these markers stand alone.
-            0xff => rest = &rest[1..],
-            0x01 | 0xd0..=0xd8 => rest = after,
-            _ => {
-                let [high, low, ..] = after else { return false };
-                rest = after.get(usize::from(u16::from_be_bytes([*high, *low]))..).unwrap_or_default();
-            }
-        }
-    }
-    // Bytes between segments that are no markers: the decoder judges them.
-    bytes.windows(2).any(|pair| pair == [0xff, END_OF_IMAGE])
 }

@@ -3,8 +3,10 @@
 const START_OF_FRAME_BASELINE: u8 = 0xc0;
 const START_OF_FRAME_EXTENDED: u8 = 0xc1;
 const START_OF_SCAN: u8 = 0xda;
+const END_OF_IMAGE: u8 = 0xd9;
 
 /// The segments of a JPEG up to its first scan header, which is the last: each marker, and what follows its length as far as the file goes.
+/// Bytes between segments that are no markers are passed over, as decoders do.
 ///
 /// # Source
 /// ITU-T T.81 B.1.1 (markers and segments).
@@ -12,20 +14,32 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
     let mut rest = bytes.get(2..);
     std::iter::from_fn(move || {
         loop {
-            let [0xff, marker, after @ ..] = rest? else { return None };
-            match *marker {
-                // Fill bytes may precede a marker; these markers stand alone.
-                0xff => rest = rest.and_then(|rest| rest.get(1..)),
-                0x01 | 0xd0..=0xd8 => rest = Some(after),
-                marker => {
+            match rest? {
+                // These markers stand alone.
+                [0xff, 0x01 | 0xd0..=0xd8, after @ ..] => rest = Some(after),
+                // Fill bytes may precede a marker, and 0 makes none.
+                [0xff, marker, after @ ..] if !matches!(*marker, 0 | 0xff) => {
                     let [high, low, body @ ..] = after else { return None };
                     rest = after.get(usize::from(u16::from_be_bytes([*high, *low]))..);
-                    rest = rest.filter(|_| marker != START_OF_SCAN);
-                    return Some((marker, body));
+                    rest = rest.filter(|_| *marker != START_OF_SCAN);
+                    return Some((*marker, body));
                 }
+                [_, after @ ..] => rest = Some(after),
+                [] => return None,
             }
         }
     })
+}
+
+/// Whether an end-of-image marker follows the first scan header. The thumbnail's own marker lies before that, in EXIF;
+/// within a scan every 0xff of the data is followed by 0 or by a restart marker; and further pictures or maker data may
+/// follow the end.
+///
+/// # Source
+/// ITU-T T.81 B.1.1.2 to B.1.1.5.
+pub(super) fn has_end_of_image(bytes: &[u8]) -> bool {
+    let scan = segments(bytes).find(|&(marker, _)| marker == START_OF_SCAN);
+    scan.is_some_and(|(_, scan)| scan.windows(2).any(|pair| pair == [0xff, END_OF_IMAGE]))
 }
 
 /// Whether a sequential JPEG has components of different resolution and not all of them in its first scan.
