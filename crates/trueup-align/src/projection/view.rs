@@ -38,6 +38,11 @@ const STEEP: [f64; 2] = [0.611, 0.873];
 /// Lengths of the mean viewing direction between which photographs come to look one way: those that look all round have no
 /// common pitch.
 const ONE_WAY: [f64; 2] = [0.4, 0.6];
+/// Root mean squares, radians (20 and 30 degrees), of how much verticals would lean in the middles of photographs that are looked at steeply, between
+/// which they come to be drawn level all the same: side by side they are a panorama, and looked at a fan.
+const FANNED: [f64; 2] = [0.349, 0.524];
+/// Angles from the horizon, radians (70 and 80 degrees), between which what photographs reach is too steep for being drawn level.
+const TOO_STEEP: [f64; 2] = [1.222, 1.396];
 /// Half angle, radians (50 degrees), within which the whole view must lie to be turned towards a facade, and by how much
 /// beyond it the turn ends (10 degrees).
 const FACED: f64 = 0.873;
@@ -107,7 +112,7 @@ impl ProjectionView {
     ) -> Self {
         let [yaw, pitch, roll] = [options.yaw, options.pitch, options.roll].map(f64::to_radians);
         let half_width = if options.fov > 0.0 { 0.5 * options.fov.to_radians() } else { PI };
-        let steep = steep_pitch(coverage);
+        let steep = steep_pitch(coverage) * (1.0 - fanned(photographs, coverage));
         let straight = match steep == 0.0 && !coverage.shows_a_pole() {
             true => coverage.middle + toward_facade(coverage, dominant),
             false => coverage.forward_longitude(),
@@ -202,6 +207,23 @@ fn steep_pitch(coverage: &SphereCoverage) -> f64 {
     let forward = coverage.forward;
     let pitch = (-forward.y).atan2(forward.x.hypot(forward.z));
     pitch * smooth(pitch.abs(), STEEP) * smooth(forward.norm(), ONE_WAY)
+}
+
+/// How much photographs that are looked at steeply would be a fan that can be drawn level: 0 not at all, 1 wholly.
+///
+/// # Source
+/// What lies a longitude aside of the middle of a conic projection leans by that times the sine of the latitude that touches the cone
+/// (J. P. Snyder, "Map projections: a working manual" (1987), section 14).
+fn fanned(photographs: &[PosedPhotograph], coverage: &SphereCoverage) -> f64 {
+    let middle = coverage.forward_longitude();
+    let aside = |photograph: &PosedPhotograph| {
+        let forward = photograph.camera.forward();
+        wrap_angle(forward.x.atan2(forward.z) - middle).powi(2)
+    };
+    let mean_square = photographs.iter().map(aside).sum::<f64>() / photographs.len().max(1) as f64;
+    let sine = coverage.forward.try_normalize(f64::MIN_POSITIVE).map_or(0.0, |forward| forward.y.abs());
+    let height = Seen::of(photographs, &Matrix3::identity(), PI).height();
+    smooth(mean_square.sqrt() * sine, FANNED) * (1.0 - smooth(height, TOO_STEEP))
 }
 
 /// By how much the viewer turns from the photographs' middle to face the nearest facade: wholly if all is still within

@@ -130,6 +130,19 @@ fn photographs_of_a_ceiling_are_looked_up_at() {
     assert!(ProjectionView::choose(&row(2, 30.0), None, &options).pitch == 0.0);
 }
 
+/// Looked at, a wide row that looks up is a fan: it is drawn level as a whole turn of it is. Near the zenith nothing can be.
+#[test]
+fn a_wide_row_that_looks_up_is_drawn_level() {
+    let pitch = |count: u32, pitch_deg: f64| view(&row(count, pitch_deg)).pitch.to_degrees();
+    // Two and three photographs show a ceiling, or a tower's top.
+    assert!(pitch(2, 45.0) > 30.0 && pitch(3, 45.0) > 25.0, "{} {}", pitch(2, 45.0), pitch(3, 45.0));
+    assert!(pitch(6, 45.0) == 0.0 && pitch(6, -45.0) == 0.0 && pitch(10, 45.0) == 0.0);
+    assert!(pitch(6, 65.0) > 60.0, "{}", pitch(6, 65.0));
+    // Not at once: one more photograph changes it by less than half.
+    let between = [3, 4, 5, 6].map(|count| pitch(count, 45.0));
+    assert!(between.is_sorted_by(|wider, narrower| wider >= narrower), "{between:?}");
+}
+
 /// Rings at 20, 50 and 75 degrees down, and straight down, as drones take them: a sphere. Without the first, what is below.
 #[test]
 fn a_drone_looks_round_and_down() {
