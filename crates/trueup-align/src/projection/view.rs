@@ -38,9 +38,9 @@ const STEEP: [f64; 2] = [0.611, 0.873];
 /// Lengths of the mean viewing direction between which photographs come to look one way: those that look all round have no
 /// common pitch.
 const ONE_WAY: [f64; 2] = [0.4, 0.6];
-/// Root mean squares, radians (20 and 30 degrees), of how much verticals would lean in the middles of photographs that are looked at steeply, between
+/// Root mean squares, radians (17 and 24 degrees), of how much verticals would lean in the middles of photographs that are looked at steeply, between
 /// which they come to be drawn level all the same: side by side they are a panorama, and looked at a fan.
-const FANNED: [f64; 2] = [0.349, 0.524];
+const FANNED: [f64; 2] = [0.297, 0.419];
 /// Angles from the horizon, radians (70 and 80 degrees), between which what photographs reach is too steep for being drawn level.
 const TOO_STEEP: [f64; 2] = [1.222, 1.396];
 /// Half angle, radians (50 degrees), within which the whole view must lie to be turned towards a facade, and by how much
@@ -94,7 +94,7 @@ impl ProjectionView {
             _ => coverage.middle,
         };
         let [yaw, pitch, roll] = [options.yaw, options.pitch, options.roll].map(f64::to_radians);
-        let steep = if kind.turns() { 0.0 } else { steep_pitch(coverage) };
+        let steep = if kind.turns() { 0.0 } else { share_looked_at(coverage) * mean_pitch(coverage) };
         let straight = if steep == 0.0 { straight } else { coverage.forward_longitude() };
         let [width, height] = kind.comfortable();
         let width = if options.fov > 0.0 { 0.5 * options.fov.to_radians() } else { width };
@@ -112,11 +112,15 @@ impl ProjectionView {
     ) -> Self {
         let [yaw, pitch, roll] = [options.yaw, options.pitch, options.roll].map(f64::to_radians);
         let half_width = if options.fov > 0.0 { 0.5 * options.fov.to_radians() } else { PI };
-        let steep = steep_pitch(coverage) * (1.0 - fanned(photographs, coverage));
-        let straight = match steep == 0.0 && !coverage.shows_a_pole() {
-            true => coverage.middle + toward_facade(coverage, dominant),
-            false => coverage.forward_longitude(),
+        let looked_at = match share_looked_at(coverage) {
+            0.0 => 0.0,
+            share => share * (1.0 - fanned(photographs, coverage)),
         };
+        let steep = looked_at * mean_pitch(coverage);
+        // Longitudes at a pole say nothing of the middle.
+        let aside = if coverage.shows_a_pole() { 1.0 } else { looked_at };
+        let level_middle = coverage.middle + toward_facade(coverage, dominant);
+        let straight = level_middle + aside * wrap_angle(coverage.forward_longitude() - level_middle);
         let looking = |level_pitch: f64| {
             let view = Self {
                 flat: Flat::named(FlatKind::Perspective, 0.0),
@@ -202,11 +206,15 @@ fn goes_round(coverage: &SphereCoverage, options: &ProjectionOptions) -> bool {
     is_wanted && coverage.is_full_turn() && (coverage.goes_round_horizon || !looks_at_a_pole)
 }
 
-/// How far up photographs are looked at that look one way and steeply; 0 where they are drawn level.
-fn steep_pitch(coverage: &SphereCoverage) -> f64 {
+/// How far up photographs look in the mean.
+fn mean_pitch(coverage: &SphereCoverage) -> f64 {
     let forward = coverage.forward;
-    let pitch = (-forward.y).atan2(forward.x.hypot(forward.z));
-    pitch * smooth(pitch.abs(), STEEP) * smooth(forward.norm(), ONE_WAY)
+    (-forward.y).atan2(forward.x.hypot(forward.z))
+}
+
+/// How much of the way up photographs are looked at that look one way and steeply: 0 where they are drawn level, 1 all of it.
+fn share_looked_at(coverage: &SphereCoverage) -> f64 {
+    smooth(mean_pitch(coverage).abs(), STEEP) * smooth(coverage.forward.norm(), ONE_WAY)
 }
 
 /// How much photographs that are looked at steeply would be a fan that can be drawn level: 0 not at all, 1 wholly.
