@@ -150,6 +150,15 @@ impl InterpretationPlanes {
         }
     }
 
+    /// A segment's middle as a pinhole of the same focal length sees it, pixels from the principal point; not finite where none does.
+    pub(crate) fn straight_middle(&self, line: usize) -> Vector2<f64> {
+        match &self.middle_rays {
+            None => self.midpoints[line],
+            Some(rays) if rays[line].z > 0.0 => rays[line].xy() / rays[line].z * self.focal_px,
+            Some(_) => Vector2::repeat(f64::NAN),
+        }
+    }
+
     /// Number of usable segments.
     pub(crate) fn len(&self) -> usize {
         self.normals.len()

@@ -8,7 +8,7 @@
 //! it is v . c / (2 |f v_xy - m v_z|), exactly; behind a lens that bends, what [`InterpretationPlanes::reach`] has in place
 //! of the divisor.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use trueup_core::geometry::{exp_rotation, nearest_rotation, orthonormal_complement};
 
 use super::interpretation::InterpretationPlanes;
@@ -211,12 +211,11 @@ impl LineVote {
         self.photographs.len()
     }
 
-    /// `value` of the direction of every segment's midpoint in the common frame, not of unit length; by photograph.
+    /// `value` of the direction of every segment's middle in the common frame, by photograph.
     pub(crate) fn by_midpoint<T>(&self, value: impl Fn(Vector3<f64>) -> T) -> Vec<Vec<T>> {
         let of_photograph = |photograph: &PhotographLines| {
-            let toward =
-                |midpoint: &Vector2<f64>| photograph.rotation.tr_mul(&midpoint.push(photograph.planes.focal_px));
-            photograph.planes.midpoints.iter().map(|midpoint| value(toward(midpoint))).collect()
+            let toward = |line: usize| photograph.rotation.tr_mul(&photograph.planes.toward(line));
+            (0..photograph.planes.len()).map(|line| value(toward(line))).collect()
         };
         self.photographs.iter().map(of_photograph).collect()
     }

@@ -106,13 +106,14 @@ fn segments(planes: &InterpretationPlanes, larger_side: f64) -> Vec<Segment> {
         let line = Vector3::new(normal.x, normal.y, normal.z * focal_px / larger_side);
         let line = line / line.xy().norm();
         Segment {
-            middle: planes.midpoints[index] / larger_side,
+            middle: planes.straight_middle(index) / larger_side,
             along: Vector2::new(-line.y, line.x),
             line,
             weight: planes.weights[index],
         }
     };
-    (0..planes.len()).map(segment).filter(|segment| segment.line.iter().all(|value| value.is_finite())).collect()
+    let is_placed = |segment: &Segment| segment.line.iter().chain(&segment.middle).all(|value| value.is_finite());
+    (0..planes.len()).map(segment).filter(is_placed).collect()
 }
 
 /// At most [`MAX_POINTS`] homogeneous points of unit length, the one of most support first.
