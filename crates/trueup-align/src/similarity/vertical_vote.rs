@@ -1,6 +1,7 @@
 //! A vertical from the segments of all photographs alone, where the horizontal directions do not agree.
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use crate::vanishing::frame_search::{SEARCH_DEG, cone};
 use crate::vanishing::joint::{LineVote, Support};
@@ -49,7 +50,7 @@ pub(super) fn vertical_peak(vote: &LineVote, expected: &Vector3<f64>) -> Option<
     let tolerance = TOLERANCE_DEG.to_radians();
     let candidates = cone(expected, SEARCH_DEG.to_radians(), tolerance * 0.7);
     let scored: Vec<(f64, Vector3<f64>)> =
-        candidates.into_iter().map(|direction| (vote.support(&direction, tolerance).score, direction)).collect();
+        candidates.into_par_iter().map(|direction| (vote.support(&direction, tolerance).score, direction)).collect();
     // The first of equals, so that the order of the candidates decides.
     let mut best = scored.first().copied()?;
     for &candidate in &scored {

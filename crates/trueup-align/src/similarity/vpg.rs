@@ -396,7 +396,10 @@ impl<'a> SceneDirections<'a> {
 
     /// The prior of a vertical alone, sought near the level of the cameras, if the segments leave no doubt about it.
     fn vertical_alone(&self, guidance: &mut Guidance) -> Option<Upright> {
-        let peak = vertical_peak(&self.vote, &self.level.down).filter(|_| self.options.vertical_only)?;
+        if !self.options.vertical_only {
+            return None;
+        }
+        let peak = vertical_peak(&self.vote, &self.level.down)?;
         let total_weight = self.vote.total_weight();
         guidance.vertical_rivalry = Some(peak.rivalry);
         guidance.vertical_share = Some(peak.share(total_weight));
