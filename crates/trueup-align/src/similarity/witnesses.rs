@@ -14,7 +14,7 @@ use crate::vanishing::jackknife::{
 use crate::vanishing::joint::{AxisWeights, LineVote, Refinement, TOLERANCE_DEG};
 use crate::vanishing::supporters::BUILT_DEVIATION_DEG;
 
-/// The same for lines along a slope, degrees. Reasoned: pavements drain by 1 to 2 degrees, streets and ramps climb by up to 6.
+/// [`BUILT_DEVIATION_DEG`] for lines along a slope, degrees. Reasoned: pavements drain by 1 to 2 degrees, streets and ramps climb by up to 6.
 const SLOPE_SPREAD_DEG: f64 = 3.0;
 /// Share of scenes whose level lines lie along a slope. Reasoned.
 const SLOPING_SHARE: f64 = 0.2;
