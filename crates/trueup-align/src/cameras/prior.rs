@@ -65,7 +65,7 @@ impl CameraPrior {
             // The lens's own place for a ray at half the angle lies half the longer side from the middle.
             let place = lens.place(Vector3::new(half.sin(), 0.0, half.cos())).map(|place| place.norm());
             let focal_px = place.map(|place| 0.5 * self.longer() / place).filter(|focal_px| focal_px.is_finite());
-            self.focal_told = focal_px.is_some();
+            self.focal_told |= focal_px.is_some();
             self.focal_px = focal_px.or(self.focal_px);
         }
         self
