@@ -56,13 +56,13 @@ pub fn find_cut(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matr
         let next = directions.get(k + 1).copied().unwrap_or(directions[0] + TAU);
         wrap_angle(0.5 * (directions[k] + next))
     });
-    let candidates = middles.map(|yaw| {
-        let severed = severed_by(yaw, &yaws, edges);
-        let weight = severed.iter().map(|edge| edge.weight).sum();
-        CutCandidate { yaw, torn: !stays_connected(yaw, &yaws, edges), weight }
-    });
+    let weight = |yaw: f64| -> usize { severed_by(yaw, &yaws, edges).iter().map(|edge| edge.weight).sum() };
+    let mut candidates: Vec<CutCandidate> = middles.map(|yaw| CutCandidate { yaw, weight: weight(yaw) }).collect();
     // Of equals the first.
-    let CutCandidate { yaw, torn, .. } = candidates.min_by_key(|candidate| (candidate.torn, candidate.weight))?;
+    candidates.sort_by_key(|candidate| candidate.weight);
+    let whole = candidates.iter().find(|candidate| stays_connected(candidate.yaw, &yaws, edges));
+    let torn = whole.is_none();
+    let yaw = whole.or(candidates.first())?.yaw;
     let severed = severed_by(yaw, &yaws, edges);
     // A photograph that looks at a pole lies beside every direction; its overlaps say nothing of the turn.
     let turns_round = |edge: &&&GraphEdge| {
@@ -78,8 +78,6 @@ pub fn find_cut(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matr
 #[derive(Debug, Clone, Copy)]
 struct CutCandidate {
     yaw: f64,
-    /// Whether the photographs fall apart without the overlaps that it severs.
-    torn: bool,
     /// Matches in all overlaps that it severs.
     weight: usize,
 }

@@ -23,9 +23,10 @@ pub(super) fn contradicting_pairs(
     let level = straightening::level_by_cameras(cameras);
     let goes_round =
         |left_out: &dyn Fn(usize) -> bool| full_turn::goes_round(cameras, &edges_without(pairs, left_out), &level);
-    if goes_round(&|_| false) && !goes_round(&|position| dropped.contains(&position)) {
-        let all = dropped.clone();
-        let closes = |pair: usize| goes_round(&|position| position != pair && all.contains(&position));
+    let mut is_dropped = vec![false; pairs.len()];
+    dropped.iter().for_each(|&pair| is_dropped[pair] = true);
+    if goes_round(&|_| false) && !goes_round(&|position| is_dropped[position]) {
+        let closes = |pair: usize| goes_round(&|position| position != pair && is_dropped[position]);
         dropped.retain(|&pair| pair_rms_px[pair] > KEPT_WHERE_CLOSING * max_rms_px || !closes(pair));
     }
     dropped.sort_unstable();
@@ -55,10 +56,12 @@ fn suspects(pair_rms_px: &[f64], max_rms_px: f64) -> Vec<usize> {
 /// Those of `suspects` without which, one after the other, the photographs stay connected.
 fn not_needed(photographs: usize, pairs: &[PairMatches], suspects: &[usize]) -> Vec<usize> {
     let mut dropped: Vec<usize> = Vec::new();
+    let mut is_dropped = vec![false; pairs.len()];
     for &suspect in suspects {
-        let rest = edges_without(pairs, &|position| position == suspect || dropped.contains(&position));
+        let rest = edges_without(pairs, &|position| position == suspect || is_dropped[position]);
         if StitchGraph::from_edges(photographs, rest).components.len() == 1 {
             dropped.push(suspect);
+            is_dropped[suspect] = true;
         }
     }
     dropped
