@@ -167,15 +167,21 @@ pub(super) fn find(
         rotating_focal,
         straight_on,
     };
+    let are_scans = |plane: &Residuals| {
+        let as_good_as_rotating = plane.rms_px <= AS_GOOD * rotating.rms_px;
+        told || as_good_as_rotating && plane.explained >= LEAST_EXPLAINED_OF_SCANS
+    };
     let scans = if may_be_scans { search.straight_on()? } else { None };
+    let scans = scans.filter(|cameras| is_at_one_scale(cameras)).map(|cameras| (of_plane(&cameras), cameras));
+    let scans = scans.filter(|(plane, _)| are_scans(plane));
+    // Tilted cameras take the longest to find: not where they would be believed in no case.
+    if scans.is_none() && !(told || is_bad || is_longer_than(LONGEST_BELIEVED)) {
+        return Ok(None);
+    }
     let tilted = search.tilted()?;
     let tilted = tilted.map(|cameras| (of_plane(&cameras), cameras));
-    if let Some(cameras) = scans.filter(|cameras| is_at_one_scale(cameras)) {
-        let plane = of_plane(&cameras);
-        let as_good_as_tilted = tilted.as_ref().is_none_or(|(tilted, _)| plane.rms_px <= AS_GOOD * tilted.rms_px);
-        let as_good_as_rotating = plane.rms_px <= AS_GOOD * rotating.rms_px;
-        let is_explained = plane.explained >= LEAST_EXPLAINED_OF_SCANS;
-        if as_good_as_tilted && (told || as_good_as_rotating && is_explained) {
+    if let Some((plane, cameras)) = scans {
+        if tilted.as_ref().is_none_or(|(tilted, _)| plane.rms_px <= AS_GOOD * tilted.rms_px) {
             return Ok(Some(FlatScene { cameras, evidence: evidence(&plane, true), turned_by_lines: None }));
         }
     }
