@@ -161,18 +161,27 @@ impl GridMesh {
     /// Clockwise angle from down to where the direction that the clockwise turn `gamma` stands upright points, in the middle of
     /// the photograph as it lies in the panorama; radians, in [-pi, pi). NaN where the middle has no place.
     ///
-    /// By central differences over the cells around the middle vertex, in both directions: a panorama may stretch the two
-    /// differently, and then the direction of the columns says nothing of another one.
+    /// By central differences over the cells around the middle vertex, or across the middle cell where there is none, in both
+    /// directions: a panorama may stretch the two differently, and then the direction of the columns says nothing of another one.
     pub fn lean_in_the_middle(&self, gamma: f64) -> f64 {
-        let (row, column) = (self.rows / 2, self.columns / 2);
-        let (above, below) = (row.saturating_sub(1), (row + 1).min(self.rows - 1));
-        let (left, right) = (column.saturating_sub(1), (column + 1).min(self.columns - 1));
+        // The vertices nearest to the middle, before and behind it, and those that differences are taken between.
+        let nearest = |count: usize| [(count.saturating_sub(1)) / 2, count / 2];
+        let around = |count: usize| match nearest(count) {
+            [before, behind] if before == behind => {
+                [before.saturating_sub(1), (behind + 1).min(count.saturating_sub(1))]
+            }
+            apart => apart,
+        };
         let step = |from: usize, to: usize| {
             let length = (self.source(to) - self.source(from)).norm();
             (Vector2::from(self.target[to]) - Vector2::from(self.target[from])) / length
         };
-        let along_row = step(row * self.columns + left, row * self.columns + right);
-        let along_column = step(above * self.columns + column, below * self.columns + column);
+        let ([left, right], [above, below]) = (around(self.columns), around(self.rows));
+        let [along_row, other_row] =
+            nearest(self.rows).map(|row| step(row * self.columns + left, row * self.columns + right));
+        let [along_column, other_column] =
+            nearest(self.columns).map(|column| step(above * self.columns + column, below * self.columns + column));
+        let (along_row, along_column) = ((along_row + other_row) / 2.0, (along_column + other_column) / 2.0);
         let down = along_row * gamma.sin() + along_column * gamma.cos();
         // What points down in the scene points to `down`: turned by the angle that takes (0, 1) there.
         wrap_angle(-roll_from_down(&down.push(0.0)))
