@@ -1,7 +1,8 @@
 //! Refinements on synthetic pairs whose true misalignment is known.
 
-use nalgebra::Vector2;
+use nalgebra::{Matrix3, Vector2};
 use trueup_core::StageContext;
+use trueup_core::camera::Camera;
 use trueup_core::lines::{LineSegment, PairLines};
 use trueup_core::matches::{PairMatches, PointMatch};
 use trueup_core::mesh::GridMesh;
@@ -256,11 +257,12 @@ fn a_bent_line_is_pulled_straight() {
         }
     }
     let lines = vec![vec![segment([200.0, 10.0], [200.0, 230.0])], Vec::new()];
+    let pinhole = Camera::new(300.0, 320.0, 240.0, &Matrix3::identity());
     let bend = |structure: Option<StructureInput>, refinements: &Refinements| {
         let bases = bases();
         let warped = solved(&MeshInput { structure, ..input(&grids, &warps, &bases) }, refinements);
         let mesh = &warped.expect("solvable").meshes[0];
-        crate::metrics::Straightness::of(&lines[0][0], mesh, 3.0).expect("a line").rms_px
+        crate::metrics::Straightness::of(&lines[0][0], &pinhole, mesh, 3.0).expect("a line").rms_px
     };
     let plain = bend(None, &Refinements::default());
     let structure = StructureOptions { weight: 100.0 };

@@ -84,7 +84,7 @@ fn vertical_lines(
 ) -> Vec<Vec<LineSegment>> {
     let down = geometry.prior.level_from_world().row(1).transpose();
     let of_photograph = |k: usize| -> Vec<LineSegment> {
-        let (lines, camera) = (&component.lines[k], &geometry.cameras.cameras[k]);
+        let (lines, camera) = (&geometry.lines(component)[k], &geometry.cameras.cameras[k]);
         let expected_down = rolls[k].map_or_else(|| camera.rotation() * down, |known| known.down);
         let photograph = VerticalLinesInput { lines, frame: &component.frames[k], camera, expected_down };
         let vertical = match rolls[k] {
@@ -93,7 +93,7 @@ fn vertical_lines(
         };
         vertical.into_iter().map(|line| lines[line]).collect()
     };
-    (0..component.lines.len()).into_par_iter().map(of_photograph).collect()
+    (0..component.members.len()).into_par_iter().map(of_photograph).collect()
 }
 
 /// The roll of every photograph that the lines of all of them tell.
@@ -101,7 +101,7 @@ fn rolls(component: &Component, geometry: &Geometry) -> Vec<Option<EstimatedRoll
     let input = RollsInput {
         cameras: &geometry.cameras.cameras,
         edges: &geometry.coinciding,
-        lines: &component.lines,
+        lines: geometry.lines(component),
         frames: &component.frames,
         prior: &geometry.prior,
     };
@@ -113,7 +113,8 @@ fn rolls(component: &Component, geometry: &Geometry) -> Vec<Option<EstimatedRoll
 /// The long lines of photograph `k`.
 fn long_lines(component: &Component, geometry: &Geometry, k: usize) -> Vec<EvidenceLine> {
     let shortest = metrics::LONG_LINE_DIAGONAL * component.frames[k].diagonal();
-    let long: Vec<LineSegment> = component.lines[k].iter().filter(|line| line.length() >= shortest).copied().collect();
+    let long: Vec<LineSegment> =
+        geometry.lines(component)[k].iter().filter(|line| line.length() >= shortest).copied().collect();
     let directions = match geometry.triads[k].triad() {
         Some(triad) => {
             let matrix = triad.matrix();

@@ -186,7 +186,7 @@ fn reprojection(
 fn measured_lines((photograph, working): (&EvidencePhotograph, &GridMesh)) -> Vec<MeasuredLine> {
     let full = |end: [f64; 2]| end.map(|coordinate| coordinate / photograph.frame.working_from_full);
     let measured = |line: &EvidenceLine| {
-        let found = Straightness::of(&line.segment, working, metrics::LINE_STEP_PX)?;
+        let found = Straightness::of(&line.segment, &photograph.camera, working, metrics::LINE_STEP_PX)?;
         Some(MeasuredLine {
             start: full(line.segment.start),
             end: full(line.segment.end),

@@ -59,6 +59,16 @@ pub(crate) struct Geometry {
     pub mesh: WarpedMesh,
     /// The pairs whose overlaps are to coincide.
     pub coinciding: Vec<PairMatches>,
+    /// The photographs' segments as they were found again behind lenses that bend, in working pixels; `None` where those
+    /// measured stand.
+    pub straightened: Option<Vec<Vec<LineSegment>>>,
+}
+
+impl Geometry {
+    /// The segments of the photographs that it was found for, in working pixels.
+    pub(crate) fn lines<'a>(&'a self, component: &'a Component) -> &'a [Vec<LineSegment>] {
+        self.straightened.as_deref().unwrap_or(&component.lines)
+    }
 }
 
 /// Finds the geometry of a group, unless an earlier run did, by `options` that are fixed by the method. Photographs are numbered
@@ -97,7 +107,8 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
         .time("straightened lines", || straightened::lines(component, &cameras.cameras, input.photographs, context))?;
     if let Some(scene) = &cameras.flat_scene {
         let scene = scene.stood_upright(&lines, component.reference_rotation);
-        return find_on_plane(input, scene, &grids, &overlaps.value, options, context);
+        let geometry = find_on_plane(input, scene, &grids, &overlaps.value, options, context)?;
+        return Ok(Geometry { straightened: found_again(lines), ..geometry });
     }
     let triads = match input.directions {
         Some(known) => known.to_vec(),
@@ -134,7 +145,15 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
         report_cut(cut, mesh.period.is_some(), component, context);
     }
     let coinciding = if mesh.period.is_some() { pairs.clone() } else { within_turn };
-    Ok(Geometry { cameras: cameras.clone(), triads, prior, mesh, coinciding })
+    Ok(Geometry { cameras: cameras.clone(), triads, prior, mesh, coinciding, straightened: found_again(lines) })
+}
+
+/// Segments that are not those measured.
+fn found_again(lines: Cow<[Vec<LineSegment>]>) -> Option<Vec<Vec<LineSegment>>> {
+    match lines {
+        Cow::Borrowed(_) => None,
+        Cow::Owned(lines) => Some(lines),
+    }
 }
 
 /// The geometry of a flat scene that stands upright: grids on its plane.
@@ -162,7 +181,7 @@ fn find_on_plane(
     };
     let mesh = context.in_one_step("mesh", || deformation.by_mesh(options, context))?;
     let triads = vec![TriadOutcome::Missing(MissingTriad::FlatScene); grids.len()];
-    Ok(Geometry { triads, prior, mesh, coinciding: pairs.clone(), cameras })
+    Ok(Geometry { triads, prior, mesh, coinciding: pairs.clone(), cameras, straightened: None })
 }
 
 /// What the photographs' lines tell.
