@@ -60,6 +60,13 @@ impl Folder {
         Self::open(&path)
     }
 
+    /// Its path from `root`, as [`inside`](Self::inside) takes it: empty if it is `root` itself.
+    pub(crate) fn path_from(&self, root: &Self) -> String {
+        let path = self.given.strip_prefix(&root.given).unwrap_or(Path::new(""));
+        let names: Vec<_> = path.iter().map(|name| name.to_string_lossy()).collect();
+        names.join("/")
+    }
+
     /// The photographs in it, in the order of the command, links to elsewhere left out, and of more than
     /// [`MAX_PHOTOGRAPHS`] the first.
     pub(crate) fn photographs(&self) -> Vec<PathBuf> {
@@ -111,7 +118,7 @@ mod tests {
     fn nothing_outside_of_the_folder_is_in_it() {
         let desk = tempfile::tempdir().expect("a folder");
         let (inner, outer) = (desk.path().join("inner"), desk.path().join("outer"));
-        for folder in [&inner, &outer, &inner.join("sub")] {
+        for folder in [&inner, &outer, &inner.join("sub"), &inner.join("sub/sub")] {
             std::fs::create_dir(folder).expect("a folder");
         }
         std::fs::write(outer.join("secret.jpg"), "x").expect("a file");
@@ -125,7 +132,9 @@ mod tests {
         let folder = Folder::open(&inner).expect("opened");
         assert_eq!(folder.photographs(), [inner.join("own.jpg")]);
         assert_eq!((folder.folders(), folder.projects()), (vec!["sub".to_owned()], vec!["own.json".to_owned()]));
-        assert!(folder.inside("sub").is_ok());
+        for path in ["", "sub", "sub/sub"] {
+            assert_eq!(folder.inside(path).expect("inside").path_from(&folder), path);
+        }
         let outside = outer.display().to_string();
         for name in ["..", "../outer", "way", "sub/../../outer", "/", outside.as_str(), "none", "."] {
             assert!(folder.inside(name).is_err(), "{name}");

@@ -32,6 +32,8 @@ pub(crate) struct Told {
 #[derive(Debug, Serialize)]
 struct ToldFolder {
     name: String,
+    /// Its path from the folder that was opened first, which folders are opened by: empty for that one.
+    inside: String,
     folders: Vec<String>,
     projects: Vec<String>,
 }
@@ -102,7 +104,7 @@ pub(crate) fn told(studio: &Studio, news: u64) -> Told {
     });
     Told {
         news,
-        folder: state.folder.as_ref().map(told_folder),
+        folder: state.folder.as_ref().map(|folder| told_folder(folder, studio)),
         photographs: told_photographs(&state),
         work: state.work.as_ref().map(|work| ToldWork {
             task: work.task,
@@ -119,8 +121,9 @@ pub(crate) fn told(studio: &Studio, news: u64) -> Told {
     }
 }
 
-fn told_folder(folder: &Folder) -> ToldFolder {
-    ToldFolder { name: folder.name(), folders: folder.folders(), projects: folder.projects() }
+fn told_folder(folder: &Folder, studio: &Studio) -> ToldFolder {
+    let inside = studio.root.as_ref().map(|root| folder.path_from(root)).unwrap_or_default();
+    ToldFolder { name: folder.name(), inside, folders: folder.folders(), projects: folder.projects() }
 }
 
 fn told_photographs(state: &State) -> Vec<ToldPhotograph> {

@@ -207,7 +207,9 @@ fn no_path_leads_out() {
     assert_eq!(told["photographs"].as_array().expect("photographs").len(), 1, "the link is not one: {told}");
     assert_eq!(told["folder"]["folders"], serde_json::json!(["inside"]));
     assert_eq!(server.post("/api/folder", r#"{"folder":"inside"}"#).status, 204);
-    assert_eq!(server.get("/api/news").json()["photographs"][0]["name"], "b.jpg");
+    let told = server.get("/api/news").json();
+    assert_eq!(told["photographs"][0]["name"], "b.jpg");
+    assert_eq!(told["folder"]["inside"], "inside");
 }
 
 /// What is dropped lands on the desk under a plain name, or nowhere.

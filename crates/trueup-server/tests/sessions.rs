@@ -181,6 +181,27 @@ fn photographs_are_shown_dropped_left_out_and_painted_on() {
     assert_eq!(listed(&server.get("/api/news").json(), 0)["used_mask"], Value::Null);
 }
 
+/// Folders are opened by their paths from the first one, which the page is told: one of the same name elsewhere is not meant.
+#[test]
+fn folders_in_folders_are_opened() {
+    let desk = tempfile::tempdir().expect("a folder");
+    for folder in ["a/b", "b"] {
+        std::fs::create_dir_all(desk.path().join(folder)).expect("a folder");
+    }
+    std::fs::write(desk.path().join("a/b/meant.jpg"), "x").expect("a file");
+    let server = Server::of(desk.path());
+    let opened = |path: &str| {
+        assert_eq!(server.post("/api/folder", &json!({ "folder": path }).to_string()).status, 204, "{path}");
+        server.get("/api/news").json()
+    };
+    assert_eq!(server.get("/api/news").json()["folder"]["inside"], "");
+    let told = opened("a");
+    assert_eq!((&told["folder"]["inside"], &told["folder"]["folders"]), (&json!("a"), &json!(["b"])));
+    let told = opened("a/b");
+    assert_eq!((&told["folder"]["inside"], &told["photographs"][0]["name"]), (&json!("a/b"), &json!("meant.jpg")));
+    assert_eq!(opened("")["folder"]["inside"], "");
+}
+
 #[test]
 fn every_format_that_is_read_can_be_chosen() {
     let desk = room();

@@ -492,7 +492,8 @@ var Opening = class {
   }
   dialog = byId("opening");
   open(now2) {
-    const folders = (now2.folder?.folders ?? []).map((name) => this.choice(name, () => post("/api/folder", { folder: name })));
+    const inside = now2.folder?.inside ? `${now2.folder.inside}/` : "";
+    const folders = (now2.folder?.folders ?? []).map((name) => this.choice(name, () => post("/api/folder", { folder: inside + name })));
     const back = now2.folder ? [this.choice("The folder of the beginning", () => post("/api/folder", { folder: "" }))] : [];
     const projects = (now2.folder?.projects ?? []).map((name) => this.choice(name, () => post("/api/project", { name })));
     const list = (title, items) => items.length > 0 ? [el("h3", {}, title), el("ul", { class: "picks" }, ...items)] : [];

@@ -23,7 +23,8 @@ export interface Stitched {
 export interface Export { number: number; to_fetch: boolean; files: { name: string; bytes: number }[] }
 export interface Told {
     news: number;
-    folder: { name: string; folders: string[]; projects: string[] } | null;
+    /** `inside` is its path from the folder of the beginning. */
+    folder: { name: string; inside: string; folders: string[]; projects: string[] } | null;
     photographs: Photograph[];
     work: { task: "stitch" | "tiles" | "export" | "reopen"; stages: Stage[]; stopping: boolean } | null;
     trouble: Trouble | null;

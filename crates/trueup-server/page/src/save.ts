@@ -89,7 +89,8 @@ export class Opening {
     }
 
     open(now: Told): void {
-        const folders = (now.folder?.folders ?? []).map((name) => this.choice(name, () => post("/api/folder", { folder: name })));
+        const inside = now.folder?.inside ? `${now.folder.inside}/` : "";
+        const folders = (now.folder?.folders ?? []).map((name) => this.choice(name, () => post("/api/folder", { folder: inside + name })));
         const back = now.folder ? [this.choice("The folder of the beginning", () => post("/api/folder", { folder: "" }))] : [];
         const projects = (now.folder?.projects ?? []).map((name) => this.choice(name, () => post("/api/project", { name })));
         const list = (title: string, items: HTMLElement[]) => (items.length > 0 ? [el("h3", {}, title), el("ul", { class: "picks" }, ...items)] : []);

@@ -299,6 +299,24 @@ async function names() {
     step("markup in names is text");
 }
 
+/** Of a folder that was opened, the folders in it are opened, and none of the same name elsewhere. */
+async function folders() {
+    const folder = join(desk, "folders");
+    await cp(join(room, "00.jpg"), join(folder, "b", "elsewhere.jpg"));
+    await cp(join(room, "00.jpg"), join(folder, "a", "b", "meant.jpg"));
+    const page = await open(await serve(folder));
+    for (const name of ["a", "b"]) {
+        await page.getByRole("button", { name: "Open" }).click();
+        await page.getByRole("button", { name, exact: true }).click();
+        await page.waitForFunction((shown) => document.getElementById("place").textContent === shown, name);
+    }
+    await page.locator("#strip .name", { hasText: "meant.jpg" }).waitFor();
+    await page.getByRole("button", { name: "Open" }).click();
+    await page.getByRole("button", { name: "The folder of the beginning" }).click();
+    await page.waitForFunction(() => document.getElementById("place").textContent === "folders");
+    step("folders in folders are opened");
+}
+
 let failure;
 try {
     const page = await stitchAndLook();
@@ -313,6 +331,7 @@ try {
     await keepMasks();
     await phone();
     await names();
+    await folders();
     assert.deepEqual(complaints, [], "the browser complains of nothing");
     step("done");
 } catch (error) {
