@@ -98,19 +98,22 @@ export class Opening {
         this.dialog.showModal();
     }
 
-    /** Takes photographs, and a project after them. */
+    /** Takes photographs, and a project after them. One that is refused does not keep the others out; the first such is told. */
     async take(files: File[]): Promise<void> {
         this.dialog.close();
         const isProject = (file: File) => file.name.toLowerCase().endsWith(".json");
-        try {
-            for (const file of files.filter((one) => !isProject(one))) {
-                await ask(`/api/photographs?name=${encodeURIComponent(file.name)}`, { method: "PUT", body: file });
+        let first: Refused | null = null;
+        for (const file of [...files.filter((one) => !isProject(one)), ...files.filter(isProject)]) {
+            const address = isProject(file) ? "/api/project" : `/api/photographs?name=${encodeURIComponent(file.name)}`;
+            try {
+                await ask(address, { method: "PUT", body: file });
+            } catch (error) {
+                if (!(error instanceof Refused)) throw error;
+                const { message, hint } = error.trouble;
+                first ??= new Refused({ message: `${file.name}: ${message}`, hint });
             }
-            for (const file of files.filter(isProject)) await ask("/api/project", { method: "PUT", body: file });
-        } catch (error) {
-            if (error instanceof Refused) this.trouble(error);
-            else throw error;
         }
+        if (first) this.trouble(first);
     }
 
     private choice(name: string, open: () => Promise<unknown>): HTMLElement {

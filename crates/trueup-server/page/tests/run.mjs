@@ -299,6 +299,22 @@ async function names() {
     step("markup in names is text");
 }
 
+/** Files that are refused do not keep those after them out, and the first is told by its name. */
+async function refusals() {
+    const page = await open(await serve());
+    await page.getByText("Drop photographs here").waitFor();
+    await writeFile(join(desk, "notes.txt"), "no photograph");
+    await writeFile(join(desk, "none.json"), new Uint8Array([0xff]));
+    const files = [join(desk, "none.json"), join(room, "00.jpg"), join(desk, "notes.txt"), join(room, "01.jpg")];
+    await page.locator("#choose").setInputFiles(files);
+    await page.locator("#told .trouble", { hasText: "notes.txt: " }).waitFor();
+    await page.locator("#strip li").nth(1).waitFor();
+    assert.deepEqual(await page.locator("#strip .name").allTextContents(), ["00.jpg", "01.jpg"]);
+    const refused = complaints.splice(0).filter((text) => !text.includes("422"));
+    complaints.push(...refused);
+    step("what is refused keeps nothing else out");
+}
+
 /** Of a folder that was opened, the folders in it are opened, and none of the same name elsewhere. */
 async function folders() {
     const folder = join(desk, "folders");
@@ -331,6 +347,7 @@ try {
     await keepMasks();
     await phone();
     await names();
+    await refusals();
     await folders();
     assert.deepEqual(complaints, [], "the browser complains of nothing");
     step("done");
