@@ -747,7 +747,7 @@ var Strip = class {
   }
   shown = "";
   show(now2) {
-    const key = JSON.stringify([now2.photographs, now2.folder?.name]);
+    const key = JSON.stringify([now2.photographs, now2.folder?.inside]);
     if (key === this.shown) return;
     this.shown = key;
     const strip2 = byId("strip");
@@ -764,7 +764,7 @@ var Strip = class {
   }
   item(photograph, now2) {
     const { number, name, verdict } = photograph;
-    const address = `/api/photographs/${number}/thumbnail?of=${encodeURIComponent(`${now2.folder?.name ?? ""}/${name}`)}`;
+    const address = `/api/photographs/${number}/thumbnail?of=${encodeURIComponent(`${now2.folder?.inside ?? ""}/${name}`)}`;
     const picture = el("img", { src: address, alt: "", loading: "lazy", width: 132, height: 99 });
     const said2 = photograph.left_out ? "left out by you" : verdict?.reason ?? "";
     const masked = photograph.used_mask || photograph.kept_mask ? el("span", { class: "badge" }, "painted") : null;

@@ -15,7 +15,7 @@ export class Strip {
     constructor(private readonly asked: Asked) {}
 
     show(now: Told): void {
-        const key = JSON.stringify([now.photographs, now.folder?.name]);
+        const key = JSON.stringify([now.photographs, now.folder?.inside]);
         if (key === this.shown) return;
         this.shown = key;
         const strip = byId("strip");
@@ -36,7 +36,7 @@ export class Strip {
 
     private item(photograph: Photograph, now: Told): HTMLElement {
         const { number, name, verdict } = photograph;
-        const address = `/api/photographs/${number}/thumbnail?of=${encodeURIComponent(`${now.folder?.name ?? ""}/${name}`)}`;
+        const address = `/api/photographs/${number}/thumbnail?of=${encodeURIComponent(`${now.folder?.inside ?? ""}/${name}`)}`;
         const picture = el("img", { src: address, alt: "", loading: "lazy", width: 132, height: 99 });
         const said = photograph.left_out ? "left out by you" : (verdict?.reason ?? "");
         const masked = photograph.used_mask || photograph.kept_mask ? el("span", { class: "badge" }, "painted") : null;
