@@ -450,13 +450,17 @@ var Saving = class {
     else if (now2.trouble) byId("save-told").textContent = `${now2.trouble.message}. ${now2.trouble.hint}`;
     else if (this.asked) byId("save-told").textContent = "Done.";
   }
-  /** A folder of tiles cannot be downloaded as one file. */
+  /** A folder of tiles cannot be downloaded as one file: without a folder to put it into, there is none. */
   places() {
+    const noFolder = byId("save-where").hidden;
+    const tiles = byId("save-format").querySelector("option[value='.dzi']");
+    if (tiles) tiles.disabled = noFolder;
     const fetch2 = this.dialog.querySelector("input[value=fetch]");
     const folder = this.dialog.querySelector("input[value=folder]");
     const isFolder = byId("save-format").value === ".dzi";
     if (fetch2) fetch2.disabled = isFolder;
     if (folder && isFolder) folder.checked = true;
+    else if (fetch2 && noFolder) fetch2.checked = true;
   }
   async save() {
     const name = byId("save-name");

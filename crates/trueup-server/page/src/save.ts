@@ -47,13 +47,17 @@ export class Saving {
         else if (this.asked) byId("save-told").textContent = "Done.";
     }
 
-    /** A folder of tiles cannot be downloaded as one file. */
+    /** A folder of tiles cannot be downloaded as one file: without a folder to put it into, there is none. */
     private places(): void {
+        const noFolder = byId("save-where").hidden;
+        const tiles = byId("save-format").querySelector<HTMLOptionElement>("option[value='.dzi']");
+        if (tiles) tiles.disabled = noFolder;
         const fetch = this.dialog.querySelector<HTMLInputElement>("input[value=fetch]");
         const folder = this.dialog.querySelector<HTMLInputElement>("input[value=folder]");
         const isFolder = byId<HTMLSelectElement>("save-format").value === ".dzi";
         if (fetch) fetch.disabled = isFolder;
         if (folder && isFolder) folder.checked = true;
+        else if (fetch && noFolder) fetch.checked = true;
     }
 
     private async save(): Promise<void> {

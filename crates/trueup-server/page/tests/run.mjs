@@ -277,7 +277,13 @@ async function phone() {
     assert.equal(wide, false, "nothing is wider than the phone");
     await page.waitForTimeout(800);
     await picture(page, "page-phone");
-    step("dropped on a phone, and stitched");
+    await page.getByRole("button", { name: "Save", exact: true }).first().click();
+    // A folder of tiles has nowhere to go.
+    assert.equal(await page.locator("#save-format option[value='.dzi']:disabled").count(), 1);
+    await page.getByRole("combobox", { name: "Format" }).selectOption(".jpg");
+    await page.locator("#save-go").click();
+    await page.locator("#save-files a", { hasText: "panorama.jpg" }).waitFor();
+    step("dropped on a phone, stitched and saved");
 }
 
 /** A name with markup, in a folder whose photographs cannot be used: all that is said of it is text. */
