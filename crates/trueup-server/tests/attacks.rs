@@ -377,6 +377,32 @@ fn a_password_is_asked_for() {
     assert!(let_in.status == 303 && let_in.head.contains("set-cookie: "), "{let_in:?}");
 }
 
+/// Guesses that never end hold up nobody who knows the password.
+#[test]
+fn unfinished_guesses_hold_up_nobody() {
+    let place = Place::new();
+    let server = Server::closed(Some(place.open()), Some("correct horse battery"));
+    let head = format!("POST /login HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\n", server.host);
+    let let_in_at_once = || {
+        let mut unfinished = [(); 3].map(|()| {
+            let mut guess = server.connect();
+            guess.write_all(format!("{head}Content-Length: 99\r\n\r\npassword=").as_bytes()).expect("sent");
+            guess
+        });
+        // The server is to have begun with them.
+        std::thread::sleep(Duration::from_millis(200));
+        let right = "password=correct+horse+battery";
+        let answer = server.send(&format!("{head}Content-Length: {}\r\n\r\n{right}", right.len()));
+        assert_eq!(answer.status, 303, "{answer:?}");
+        unfinished.iter_mut().all(|guess| {
+            guess.set_read_timeout(Some(Duration::from_millis(10))).expect("a socket");
+            guess.read(&mut [0]).is_err_and(|open| matches!(open.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut))
+        })
+    };
+    // A machine that stood still until they were given up shows nothing.
+    assert!((0..3).any(|_| let_in_at_once()), "guesses were given up before the right one was looked at");
+}
+
 #[test]
 fn short_passwords_and_missing_folders_are_refused() {
     let network =
