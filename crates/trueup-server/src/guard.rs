@@ -39,6 +39,8 @@ const REFUSED: &str = "Open the address that `trueup serve` printed in the termi
 const LOGIN: &str = "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" \
     content=\"width=device-width\"><title>trueup</title><h1>trueup</h1><form method=\"post\" action=\"/login\"><label>Password \
     <input type=\"password\" name=\"password\" autocomplete=\"current-password\" autofocus></label> <button>Open</button></form></html>";
+/// How its form ends after a wrong one.
+const WRONG: &str = "<p role=\"alert\">That is not the password.</p></form>";
 
 /// Bytes of a secret: 256 bits.
 const SECRET_BYTES: usize = 32;
@@ -145,15 +147,13 @@ impl Guard {
             return self.welcome();
         }
         tokio::time::sleep(PASSWORD_PAUSE).await;
-        (StatusCode::FORBIDDEN, [(header::CONTENT_TYPE, "text/html")], LOGIN).into_response()
+        login_page(LOGIN.replace("</form>", WRONG))
     }
 
     fn shut(&self) -> Response {
         match self.key {
             Key::Word(_) => refused(StatusCode::FORBIDDEN),
-            Key::Password(_) => {
-                (StatusCode::FORBIDDEN, [(header::CONTENT_TYPE, "text/html; charset=utf-8")], LOGIN).into_response()
-            }
+            Key::Password(_) => login_page(LOGIN),
         }
     }
 }
@@ -202,6 +202,10 @@ fn is_own_origin(request: &Request, host: &str) -> bool {
     let opened =
         request.uri().path() == "/" && looks && headers.get("sec-fetch-mode").is_some_and(|mode| mode == "navigate");
     origin && (site || opened)
+}
+
+fn login_page(text: impl IntoResponse) -> Response {
+    (StatusCode::FORBIDDEN, [(header::CONTENT_TYPE, "text/html; charset=utf-8")], text).into_response()
 }
 
 fn refused(status: StatusCode) -> Response {

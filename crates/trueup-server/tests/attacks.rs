@@ -360,6 +360,7 @@ fn a_password_is_asked_for() {
     assert!(!server.url.contains("token"), "{}", server.url);
     let asked = server.send(&format!("GET / HTTP/1.1\r\nHost: {}\r\n\r\n", server.host));
     assert!(asked.status == 403 && asked.text().contains("type=\"password\""), "{asked:?}");
+    assert!(!asked.text().contains("role=\"alert\""), "nothing was wrong yet: {asked:?}");
     let login = |text: &str, origin: &str| {
         let length = text.len();
         server.send(&format!(
@@ -371,6 +372,9 @@ fn a_password_is_asked_for() {
     for wrong in ["password=", "password=wrong", "", "password=correct+horse+battery+", "other=correct+horse+battery"] {
         let answer = login(wrong, &own);
         assert!(answer.status == 403 && !answer.head.contains("set-cookie"), "{wrong}: {answer:?}");
+        assert!(answer.head.contains("content-type: text/html; charset=utf-8"), "{wrong}: {answer:?}");
+        let said = "<p role=\"alert\">That is not the password.</p></form>";
+        assert!(answer.text().contains(said) && answer.text().contains("type=\"password\""), "{wrong}: {answer:?}");
     }
     assert_eq!(login("password=correct+horse+battery", EVIL).status, 403);
     let let_in = login("password=correct+horse%20battery", &own);
