@@ -242,6 +242,23 @@ fn uploads_have_plain_names_and_kinds() {
     place.expect_untouched();
 }
 
+/// Of two of one name that come at the same time, the one that is there first stays.
+#[test]
+fn uploads_of_one_name_are_one_photograph() {
+    let place = Place::new();
+    let server = place.server();
+    let length = format!("Origin: http://{}\r\nContent-Length: {}\r\n", server.host, NO_PHOTOGRAPH.len());
+    let mut slow = server.connect();
+    slow.write_all(server.head("PUT", "/api/photographs?name=new.jpg", &length).as_bytes()).expect("sent");
+    slow.write_all(&NO_PHOTOGRAPH[..4]).expect("sent");
+    // The server is to have begun with it.
+    std::thread::sleep(Duration::from_millis(200));
+    assert_eq!(server.with_body("PUT", "/api/photographs?name=new.jpg", NO_PHOTOGRAPH).status, 201);
+    drop(slow.write_all(&NO_PHOTOGRAPH[4..]));
+    assert_eq!(answer(&mut slow).status, 409);
+    assert_eq!(server.get("/api/news").json()["photographs"].as_array().map(Vec::len), Some(2));
+}
+
 /// Ten gigabytes are refused before they come, and so is what does not say how long it is.
 #[test]
 fn uploads_have_limits() {

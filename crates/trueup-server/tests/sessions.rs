@@ -202,6 +202,22 @@ fn folders_in_folders_are_opened() {
     assert_eq!(opened("")["folder"]["inside"], "");
 }
 
+/// What was dropped and is forgotten can be dropped again, as what it is by now.
+#[test]
+fn forgotten_photographs_are_dropped_again() {
+    let desk = room();
+    std::fs::create_dir(desk.path().join("inside")).expect("a folder");
+    let photograph = std::fs::read(desk.path().join("00.jpg")).expect("a photograph");
+    let server = Server::of(desk.path());
+    let dropped = |bytes: &[u8]| server.with_body("PUT", "/api/photographs?name=new.jpg", bytes).status;
+    assert_eq!((dropped(b"none"), dropped(b"none")), (201, 409));
+    assert_eq!(server.post("/api/folder", r#"{"folder":"inside"}"#).status, 204);
+    assert_eq!(server.get("/api/news").json()["photographs"], json!([]));
+    assert_eq!((dropped(&photograph), dropped(&photograph)), (201, 409));
+    assert_eq!(server.get("/api/news").json()["photographs"][0]["name"], "new.jpg");
+    assert_eq!(server.get("/api/photographs/0/thumbnail").status, 200, "the photograph that was dropped last");
+}
+
 #[test]
 fn every_format_that_is_read_can_be_chosen() {
     let desk = room();
@@ -407,6 +423,11 @@ fn dropped_photographs_outlive_the_program() {
     assert_eq!(told["trouble"], Value::Null, "{told}");
     assert_eq!(told["photographs"].as_array().map(Vec::len), Some(3));
     assert!(told["photographs"][1]["used_mask"].is_string());
+    // So it can be dropped again.
+    assert_eq!(other.with_body("PUT", "/api/photographs?name=fetched-01.jpg-use.png", &mask).status, 201);
+    assert_eq!(other.with_body("PUT", "/api/project", &project).status, 202);
+    let told = other.settled();
+    assert_eq!((&told["trouble"], told["photographs"].as_array().map(Vec::len)), (&Value::Null, Some(3)), "{told}");
     let again = export(&other, &order("again.png", false));
     assert!(unchunked(&other.get(&format!("/api/exports/{}/0", again["number"])).body) == picture);
 }

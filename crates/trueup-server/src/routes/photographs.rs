@@ -61,15 +61,9 @@ pub(crate) async fn drop_one(
     let name = name.ok_or_else(|| {
         Denial::unacceptable("it is not named like a photograph", format!("Give {}.", trueup::readable_formats()))
     })?;
-    let place = studio.dropped().join(name);
     {
         let state = studio.state();
-        if state.photographs.len() >= MAX_PHOTOGRAPHS {
-            return Err(Denial::unacceptable(format!("there are {MAX_PHOTOGRAPHS} photographs already"), ""));
-        }
-        if state.photographs.iter().any(|listed| listed.name() == name) {
-            return Err(Denial::not_now("there is a photograph of this name already", "Give it another name."));
-        }
+        check_room(&state, name)?;
         let announced =
             headers.get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok()?.parse::<u64>().ok());
         let room = MAX_PHOTOGRAPH_BYTES.min(MAX_DROPPED_BYTES.saturating_sub(state.dropped_bytes));
@@ -82,12 +76,31 @@ pub(crate) async fn drop_one(
         }
         drop(state);
     }
+    let place = studio.place_of_dropped(name);
+    if let Some(folder) = place.parent() {
+        tokio::fs::create_dir_all(folder).await.map_err(Denial::failure)?;
+    }
     let bytes = body::save(body, MAX_PHOTOGRAPH_BYTES, &place).await?;
-    studio.change(|state| {
+    let taken = studio.change(|state| {
+        // Another one may have come meanwhile.
+        check_room(state, name)?;
         state.dropped_bytes += bytes;
-        state.photographs.push(Listed { path: place, dropped: true });
+        state.photographs.push(Listed { path: place.clone(), dropped: true });
+        Ok(StatusCode::CREATED)
     });
-    Ok(StatusCode::CREATED)
+    // If it cannot be removed, it goes with its folder.
+    taken.inspect_err(|_| drop(std::fs::remove_file(&place)))
+}
+
+/// Whether there is room for one more photograph, of this name.
+fn check_room(state: &Now, name: &str) -> Result<(), Denial> {
+    if state.photographs.len() >= MAX_PHOTOGRAPHS {
+        return Err(Denial::unacceptable(format!("there are {MAX_PHOTOGRAPHS} photographs already"), ""));
+    }
+    if state.photographs.iter().any(|listed| listed.name() == name) {
+        return Err(Denial::not_now("there is a photograph of this name already", "Give it another name."));
+    }
+    Ok(())
 }
 
 /// A photograph as small as in a list.

@@ -195,6 +195,19 @@ impl Studio {
         self.desk.path().join(Self::DROPPED)
     }
 
+    /// Where a photograph of this name is to lie that is dropped: in the first folder there that has none. Older ones of its name stay, which
+    /// the list has forgotten; those that are dropped together lie together, by which frames of a video are known.
+    pub(crate) fn place_of_dropped(&self, name: &str) -> PathBuf {
+        let mut folder = 0_u64;
+        loop {
+            let place = self.dropped().join(folder.to_string()).join(name);
+            if place.symlink_metadata().is_err() {
+                return place;
+            }
+            folder += 1;
+        }
+    }
+
     /// Where masks lie.
     pub(crate) fn masks(&self) -> PathBuf {
         self.desk.path().join(Self::MASKS)
