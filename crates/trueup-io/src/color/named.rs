@@ -5,7 +5,7 @@ use moxcms::{
     TransferCharacteristics, XyY,
 };
 
-use super::icc::compact;
+use super::icc::{RgbSpace, Understood, compact, description, understand};
 
 /// Code points of what screens show as sRGB: its primaries, unspecified ones, and its curve (ITU-T H.273, tables 2 and 3).
 const PRIMARIES_OF_SRGB: u16 = 1;
@@ -83,10 +83,28 @@ pub(crate) fn profile_of_chromaticities(chromaticities: Chromaticities) -> Optio
     Some(compact(profile, "the primaries of the photograph").to_vec())
 }
 
+/// The profile of samples with sRGB's curve and the primaries of another profile: of light, which no curve of that profile is applied to any
+/// more. `None` where the primaries are sRGB's, and where there are none, as in profiles of gray or of tables alone. What cannot be used stays
+/// as it is, to be told of.
+pub(crate) fn profile_of_light(icc: Vec<u8>) -> Option<Vec<u8>> {
+    let own = match understand(&icc) {
+        Understood::Space(space) => space.profile,
+        Understood::Tables(profile) => profile,
+        Understood::Gray(_) => return None,
+        Understood::Foreign(_) | Understood::Damaged(_) => return Some(icc),
+    };
+    let mut profile = ColorProfile::new_srgb();
+    profile.red_colorant = own.red_colorant;
+    profile.green_colorant = own.green_colorant;
+    profile.blue_colorant = own.blue_colorant;
+    let icc = compact(profile, &format!("the primaries of {}", description(&own)));
+    let is_needed = matches!(understand(&icc), Understood::Space(space) if !space.is_same(&RgbSpace::srgb()));
+    is_needed.then(|| icc.to_vec())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::icc::{Understood, description, understand};
 
     fn name(icc: Option<Vec<u8>>) -> Option<String> {
         match understand(&icc?) {
@@ -125,6 +143,28 @@ mod tests {
             white: [0.32168, 0.33767],
         };
         assert!(name(profile_of_chromaticities(aces)).is_some());
+    }
+
+    #[test]
+    fn light_keeps_the_primaries_of_its_profile_and_not_its_curve() {
+        let with_curve = |mut profile: ColorProfile, gamma: u16| {
+            let curve = Some(ToneReprCurve::Lut(vec![gamma]));
+            (profile.red_trc, profile.green_trc, profile.blue_trc) = (curve.clone(), curve.clone(), curve);
+            profile.encode().expect("a profile")
+        };
+        // 256 stands for a gamma of 1.
+        assert_eq!(profile_of_light(with_curve(ColorProfile::new_srgb(), 256)), None);
+        let of_p3 = profile_of_light(with_curve(ColorProfile::new_display_p3(), 256));
+        let expected = ColorProfile::new_display_p3().encode().expect("a profile");
+        let [Understood::Space(found), Understood::Space(expected)] =
+            [understand(&of_p3.unwrap_or_default()), understand(&expected)]
+        else {
+            panic!("spaces")
+        };
+        assert!(found.is_same(&expected));
+        let gray = ColorProfile::new_gray_with_gamma(1.8).encode().expect("a profile");
+        assert_eq!(profile_of_light(gray), None);
+        assert_eq!(profile_of_light(b"none".to_vec()), Some(b"none".to_vec()), "to be told of");
     }
 
     /// Names of any length: readers refuse a profile whose length is none.

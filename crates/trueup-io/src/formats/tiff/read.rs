@@ -12,7 +12,8 @@ use super::convert::{rgb_of_cmyk, rgb_of_ycbcr, unpacked};
 use super::page::{FirstPage, PixelKind};
 use super::palette;
 use super::raw::{failure, is_raw};
-use super::samples::{Samples, decoder, not_as_stated, open};
+use super::samples::{Samples, TiffDecoder, decoder, not_as_stated, open};
+use crate::color::profile_of_light;
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::decoded::{check_unchanged, damaged, eight, sixteen};
 use crate::formats::foreign::RAW;
@@ -32,9 +33,15 @@ pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, Hea
     Ok(StoredPixels { width, height, bits, is_float: matches!(kind, PixelKind::Float(_)) })
 }
 
+/// The profile; of floating point samples, which are light, one of its primaries with the curve that they are handed out in.
 pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
-    let profile = decoder(input).ok()?.find_tag(Tag::IccProfile).ok().flatten()?;
-    profile.into_u8_vec().ok()
+    let mut decoder = decoder(input).ok()?;
+    let profile = decoder.find_tag(Tag::IccProfile).ok().flatten()?.into_u8_vec().ok()?;
+    if is_light(&mut decoder) { profile_of_light(profile) } else { Some(profile) }
+}
+
+fn is_light(decoder: &mut TiffDecoder<'_>) -> bool {
+    FirstPage::of(decoder).is_ok_and(|page| matches!(page.kind, PixelKind::Float(_)))
 }
 
 /// The EXIF library would read the whole file, pixels and all.

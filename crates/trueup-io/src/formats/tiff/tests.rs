@@ -2,14 +2,17 @@
 
 use std::io::Cursor;
 
+use moxcms::{ColorProfile, ToneReprCurve};
 use tempfile::TempDir;
 use tiff::encoder::{TiffEncoder, TiffValue};
 use tiff::tags::Tag;
+use trueup_core::color::TransferCurve;
 use trueup_core::raster::Photograph;
-use trueup_core::source::SourceImage;
+use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Error, StageContext};
 
-use crate::decode::{photograph, sample_bits};
+use crate::color::PhotographColors;
+use crate::decode::{FilePhotographs, photograph, sample_bits};
 use crate::source::{SourceOptions, scan};
 
 const SIDE: usize = 16;
@@ -22,6 +25,7 @@ struct Form<'a> {
     format: Option<u16>,
     palette: Option<&'a [u16]>,
     sampling: Option<[u16; 2]>,
+    icc: Option<&'a [u8]>,
     is_planar: bool,
     is_big: bool,
 }
@@ -55,6 +59,9 @@ fn tiff<T: TiffValue + ?Sized>(form: &Form<'_>, strips: &[&T]) -> Vec<u8> {
             }
             if let Some(sampling) = form.sampling {
                 directory.write_tag(Tag::ChromaSubsampling, &sampling[..]).expect("written");
+            }
+            if let Some(icc) = form.icc {
+                directory.write_tag(Tag::IccProfile, icc).expect("written");
             }
             if form.is_planar {
                 directory.write_tag(Tag::PlanarConfiguration, 2_u16).expect("written");
@@ -121,6 +128,28 @@ fn one_channel_of_floating_point_is_gray_light() {
     assert_eq!(sixteen(&decoded(&bytes)).row(0)[..3], ENCODED);
     let folder = TempDir::new().expect("a temporary folder");
     assert_eq!(sample_bits(&examined(&folder, &bytes).expect("accepted")).expect("a header"), 16);
+}
+
+/// Samples are handed out with sRGB's curve: that of the profile is no longer theirs.
+#[test]
+fn light_is_in_the_primaries_of_its_profile_alone() {
+    let linear = |mut profile: ColorProfile| {
+        let curve = Some(ToneReprCurve::Lut(Vec::new()));
+        (profile.red_trc, profile.green_trc, profile.blue_trc) = (curve.clone(), curve.clone(), curve);
+        profile.encode().expect("a profile")
+    };
+    let light = [0.25_f32, 0.5, 1.0].repeat(SIDE * SIDE);
+    for (profile, is_srgb) in [(ColorProfile::new_srgb(), true), (ColorProfile::new_display_p3(), false)] {
+        let icc = linear(profile);
+        let form = Form { photometric: 2, bits: &[32; 3], format: Some(3), icc: Some(&icc), ..Form::default() };
+        let folder = TempDir::new().expect("a temporary folder");
+        let source = examined(&folder, &tiff(&form, &[&light[..]])).expect("accepted");
+        let colors = PhotographColors::survey(std::slice::from_ref(&source), &StageContext::default());
+        assert_eq!(colors.is_srgb(), is_srgb, "{}", colors.name());
+        assert!(colors.transfer_curve().is_same(&TransferCurve::SRGB), "{:?}", colors.transfer_curve());
+        let photographs = FilePhotographs::new(vec![source], 0).in_colors(colors);
+        assert_eq!(sixteen(&photographs.photograph(0).expect("decoded")).pixel(3, 5), ENCODED);
+    }
 }
 
 #[test]
