@@ -43,6 +43,11 @@ impl Chromaticities {
     }
 }
 
+/// Whether a code point of primaries says anything.
+pub(crate) fn names_primaries(primaries: u16) -> bool {
+    primaries != UNSPECIFIED
+}
+
 /// The profile of the color space that code points name; `None` for sRGB, and for what names none.
 ///
 /// # Source

@@ -136,22 +136,54 @@ fn adobe_rgb_has_its_own_curve() {
     assert_close(pixel(&photographs, 0).0, [177.242, 99.934, 56.123], 0.1);
 }
 
+/// A block of EXIF that names Adobe RGB.
+fn exif_of_adobe_rgb() -> Vec<u8> {
+    let field = exif::Field {
+        tag: exif::Tag::InteroperabilityIndex,
+        ifd_num: exif::In::PRIMARY,
+        value: exif::Value::Ascii(vec![b"R03".to_vec()]),
+    };
+    let mut writer = exif::experimental::Writer::new();
+    writer.push_field(&field);
+    let mut block = std::io::Cursor::new(Vec::new());
+    writer.write(&mut block, false).expect("a block");
+    block.into_inner()
+}
+
+/// The same PNG with a chunk behind the first, the header (W3C PNG 5.3).
+fn with_chunk(png: &[u8], kind: &[u8; 4], content: &[u8]) -> Vec<u8> {
+    /// The signature, and the chunk IHDR.
+    const BEFORE: usize = 8 + 25;
+    let named = [kind, content].concat();
+    let mut sum = flate2::Crc::new();
+    sum.update(&named);
+    let length = (content.len() as u32).to_be_bytes();
+    [&png[..BEFORE], &length, &named, &sum.sum().to_be_bytes(), &png[BEFORE..]].concat()
+}
+
+/// Surveys a PNG of these bytes.
+fn surveyed(png: &[u8]) -> PhotographColors {
+    let folder = TempDir::new().expect("a folder");
+    let path = folder.path().join("photograph.png");
+    std::fs::write(&path, png).expect("written");
+    survey(&[path]).1
+}
+
+#[test]
+fn exif_is_not_asked_where_a_png_says_that_it_is_srgb() {
+    let plain = Specimen::eight(SIDE, SIDE, |_, _| COLOR).png(None);
+    let camera = with_chunk(&plain, b"eXIf", &exif_of_adobe_rgb());
+    assert!(!surveyed(&camera).is_srgb());
+    assert!(surveyed(&with_chunk(&camera, b"sRGB", &[0])).is_srgb());
+}
+
 #[test]
 fn exif_names_adobe_rgb_where_there_is_no_profile() {
     let folder = TempDir::new().expect("a folder");
     let path = folder.path().join("camera.jpg");
-    let fields = [exif::Field {
-        tag: exif::Tag::InteroperabilityIndex,
-        ifd_num: exif::In::PRIMARY,
-        value: exif::Value::Ascii(vec![b"R03".to_vec()]),
-    }];
-    let mut writer = exif::experimental::Writer::new();
-    writer.push_field(&fields[0]);
-    let mut block = std::io::Cursor::new(Vec::new());
-    writer.write(&mut block, false).expect("a block");
     let mut bytes = Vec::new();
     let mut encoder = jpeg_encoder::Encoder::new(&mut bytes, 95);
-    encoder.add_app_segment(1, [b"Exif\0\0", block.into_inner().as_slice()].concat()).expect("a segment");
+    encoder.add_app_segment(1, [b"Exif\0\0", exif_of_adobe_rgb().as_slice()].concat()).expect("a segment");
     let pixels = COLOR.repeat((SIDE * SIDE) as usize);
     encoder.encode(&pixels, SIDE as u16, SIDE as u16, jpeg_encoder::ColorType::Rgb).expect("encoded");
     std::fs::write(&path, bytes).expect("written");

@@ -1,6 +1,6 @@
 //! PNG.
 
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Seek, Write};
 
 use png::text_metadata::ITXtChunk;
 use png::{
@@ -22,6 +22,7 @@ use crate::format::{
     Transparency, Writer, Writing,
 };
 use crate::metadata::embedded;
+use crate::metadata::exif_fields::ExifFields;
 
 /// The declaration.
 ///
@@ -36,7 +37,7 @@ pub(crate) static PNG: Format = Format {
         has_signature: |start| start.starts_with(b"\x89PNG\r\n\x1a\n"),
         stored,
         icc,
-        exif: embedded::read_exif,
+        exif,
         whole_fields: embedded::read_fields,
         pixels,
         reduced: None,
@@ -60,30 +61,47 @@ pub(crate) const SIDES: SideLimit = SideLimit { largest: (1 << 31) - 1, advice: 
 const XMP_KEYWORD: &str = "XML:com.adobe.xmp";
 
 /// A decoder that takes at most so many bytes beside the pixels and hands them out with 8 or 16 bits a sample, palettes as
-/// RGB.
-fn decoder(input: &mut Input, bytes: usize) -> std::result::Result<png::Reader<&mut Input>, DecodingError> {
+/// RGB. A profile, which may be a few bytes that stand for as many as there are, is read where it is wanted.
+fn decoder(
+    input: &mut Input,
+    bytes: usize,
+    with_profile: bool,
+) -> std::result::Result<png::Reader<&mut Input>, DecodingError> {
     let mut decoder = Decoder::new_with_limits(input, Limits { bytes });
     decoder.set_ignore_text_chunk(false);
+    decoder.set_ignore_iccp_chunk(!with_profile);
     decoder.set_transformations(Transformations::EXPAND);
     decoder.read_info()
 }
 
+/// What stands before the pixels, without a profile. Sizes are judged by the caller, whose limit is an option.
+fn header(input: &mut Input) -> std::result::Result<png::Reader<&mut Input>, DecodingError> {
+    decoder(input, usize::MAX, false)
+}
+
 fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
-    // Sizes are judged by the caller, whose limit is an option.
-    let reader = decoder(input, usize::MAX).map_err(HeaderError::damaged)?;
+    let reader = header(input).map_err(HeaderError::damaged)?;
     let bits = if reader.output_color_type().1 == BitDepth::Sixteen { 16 } else { 8 };
     let (width, height) = reader.info().size();
     Ok(StoredPixels { width: width as usize, height: height as usize, bits, is_float: false })
 }
 
 fn icc(input: &mut Input) -> Option<Vec<u8>> {
-    decoder(input, HEADER_BYTES).ok()?.info().icc_profile.as_ref().map(|icc| icc.to_vec())
+    decoder(input, HEADER_BYTES, true).ok()?.info().icc_profile.as_ref().map(|icc| icc.to_vec())
+}
+
+/// EXIF is not asked for colors where the picture says itself that they are sRGB's.
+fn exif(input: &mut Input) -> Option<ExifFields> {
+    let fields = embedded::read_exif(input)?;
+    input.rewind().ok()?;
+    let says_srgb = header(input).is_ok_and(|reader| reader.info().srgb.is_some());
+    Some(if says_srgb { fields.without_color_space() } else { fields })
 }
 
 fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
     let failed = |error: DecodingError| damaged(source, error);
     let limit = usize::try_from(decoding_limit(source)).unwrap_or(usize::MAX);
-    let mut reader = decoder(&mut input, limit).map_err(failed)?;
+    let mut reader = decoder(&mut input, limit, false).map_err(failed)?;
     let (width, height) = reader.info().size();
     let (width, height) = (width as usize, height as usize);
     check_unchanged(source, width, height)?;

@@ -187,6 +187,33 @@ fn color_spaces_are_named() {
     assert_eq!(space(file!("p3.heic")), ("primaries 12, transfer 13 of H.273".to_owned(), true));
 }
 
+/// The same file with another number in place of its only field of EXIF's own directory: ColorSpace, Adobe RGB by the number of cameras.
+fn in_adobe_rgb(whole: &[u8], is_big_endian: bool) -> Vec<u8> {
+    // FocalLengthIn35mmFilm is 0xa405, ColorSpace 0xa001; a short, one of it.
+    let [from, to]: [&[u8]; 2] = match is_big_endian {
+        true => [b"\xa4\x05\0\x03\0\0\0\x01\0\x18", b"\xa0\x01\0\x03\0\0\0\x01\0\x02"],
+        false => [b"\x05\xa4\x03\0\x01\0\0\0\x18\0", b"\x01\xa0\x03\0\x01\0\0\0\x02\0"],
+    };
+    let at = whole.windows(from.len()).position(|window| window == from).expect("the field");
+    [&whole[..at], to, &whole[at + from.len()..]].concat()
+}
+
+#[test]
+fn files_that_name_their_colors_are_not_overruled_by_exif() {
+    let name = |bytes: &[u8]| {
+        let (_folder, source, _) = read(bytes);
+        PhotographColors::survey(&[source], &StageContext::default()).name()
+    };
+    assert_eq!(name(&in_adobe_rgb(file!("turned.avif"), true)), "sRGB", "named in numbers");
+    assert_eq!(name(&in_adobe_rgb(file!("rotated.heic"), false)), "Adobe RGB (1998) compatible", "named nowhere else");
+    let media_box = |kind: &[u8], content: &[u8]| [&(content.len() as u32 + 8).to_be_bytes(), kind, content].concat();
+    // A directory of one entry, ColorSpace in EXIF's own, which begins at byte 26.
+    let exif = b"\0\0\0\0II*\0\x08\0\0\0\x01\0\x69\x87\x04\0\x01\0\0\0\x1a\0\0\0\0\0\0\0\x01\0\x01\xa0\x03\0\x01\0\0\0\x02\0\0\0\0\0\0\0";
+    let boxes =
+        [media_box(b"JXL ", b"\r\n\x87\n"), media_box(b"Exif", exif), media_box(b"jxlc", file!("rgb.jxl"))].concat();
+    assert_eq!(name(&boxes), "sRGB", "always named");
+}
+
 /// A tile of 1203 x 1203 pixels of which 24 x 18 are shown: what is decoded for them is not what the picture's size says.
 #[test]
 fn what_is_coded_is_in_proportion_to_what_is_shown() {

@@ -154,6 +154,11 @@ impl ExifFields {
         Some(fields)
     }
 
+    /// The same without a color space: of a file that says itself what its colors are, or whose pixels are handed out in others.
+    pub(crate) fn without_color_space(self) -> Self {
+        Self { color_space: None, interoperability: None, ..self }
+    }
+
     /// How it was exposed. Moments without a digit other than 0 are those of a clock that was never set.
     pub(crate) fn exposure(&self) -> RecordedExposure {
         let positive = |value: Option<f64>| value.filter(|value| value.is_finite() && *value > 0.0);

@@ -10,7 +10,7 @@ use trueup_core::{Error, Result};
 use super::av1::{self, Frame};
 use super::color::{ChromaPlace, Matrix, Planes, Range, Reading, pixels as colored};
 use super::items::Items;
-use crate::color::profile_of_code_points;
+use crate::color::{names_primaries, profile_of_code_points};
 use crate::decode::orientation::upright;
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::alpha::{Share, straight};
@@ -333,11 +333,13 @@ pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
     icc.or_else(|| code_points.and_then(|points| profile_of_code_points(points.primaries, points.transfer)))
 }
 
-/// The pixels are turned upright as the file itself says, which outranks the orientation of EXIF.
+/// The pixels are turned upright as the file itself says, which outranks the orientation of EXIF; so do the numbers of its colors.
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
     let bytes = contents(input, READING).ok()?;
-    let fields = ExifFields::from_exif(&block::parsed(described(&bytes).ok()?.exif()?)?);
-    Some(ExifFields { orientation: None, ..fields })
+    let described = described(&bytes).ok()?;
+    let fields = ExifFields { orientation: None, ..ExifFields::from_exif(&block::parsed(described.exif()?)?) };
+    let says_colors = described.code_points.is_some_and(|points| names_primaries(points.primaries));
+    Some(if says_colors { fields.without_color_space() } else { fields })
 }
 
 pub(super) fn whole_fields(input: &mut Input, wanted: &[Tag]) -> Option<Vec<Field>> {

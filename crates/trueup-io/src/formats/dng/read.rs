@@ -45,8 +45,9 @@ fn block(input: &mut Input) -> Option<exif::Exif> {
     block::parsed(bytes)
 }
 
+/// The color space in EXIF is that of pictures that the camera makes itself: sensors' colors are developed to sRGB.
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
-    Some(ExifFields::from_exif(&block(input)?))
+    Some(ExifFields::from_exif(&block(input)?).without_color_space())
 }
 
 pub(super) fn whole_fields(input: &mut Input, wanted: &[Tag]) -> Option<Vec<Field>> {

@@ -2,10 +2,13 @@
 //! them, the lossless JPEG in one by imagecodecs. LibRaw (rawpy 0.28) develops them to within 0.2 and 0.8 levels of the same colors.
 
 use tempfile::TempDir;
+use trueup_core::StageContext;
 use trueup_core::raster::Photograph;
 
+use crate::color::PhotographColors;
 use crate::decode::photograph;
 use crate::formats::reading_tests::{difference, file, level_at, read, scanned};
+use crate::metadata::header::read_fields;
 use crate::source::Sources;
 
 /// The colors of both files, at a pixel as it is stored.
@@ -184,6 +187,24 @@ fn a_sub_image_is_never_taken_for_the_photograph() {
     // A preview below the first directory is none either.
     let preview = with(linear(), &[(254, Long(vec![1]))]);
     assert!(refusal(&negative(&numbers(), preview, of_srgb())).contains("without a picture of the sensor"));
+}
+
+/// Cameras say in EXIF what their own pictures are in; what is developed here is in sRGB.
+#[test]
+fn what_is_developed_is_in_srgb_whatever_exif_says() {
+    const EXIF_DIRECTORY: u16 = 34_665;
+    const COLOR_SPACE: u16 = 0xa001;
+    const ADOBE_RGB: u16 = 2;
+    let pointing_to = |place: usize| {
+        let main = with(of_srgb(), &[(EXIF_DIRECTORY, Long(vec![place as u32]))]);
+        negative(&numbers(), linear(), main)
+    };
+    let end = pointing_to(0).len();
+    let exif = directory(vec![(COLOR_SPACE, Short(vec![ADOBE_RGB]))], end);
+    let (_folder, source, _) = read(&[pointing_to(end), exif].concat());
+    let fields = read_fields(&source.path, &[exif::Tag::ColorSpace]);
+    assert_eq!(fields[0].value.get_uint(0), Some(ADOBE_RGB.into()), "it is said");
+    assert!(PhotographColors::survey(&[source], &StageContext::default()).is_srgb());
 }
 
 #[test]

@@ -13,7 +13,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
 use super::container::check_copies;
-use crate::color::profile_of_code_points;
+use crate::color::{names_primaries, profile_of_code_points};
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::alpha::{Share, straight};
 use crate::formats::boxes::contents;
@@ -96,10 +96,12 @@ pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
 }
 
 /// The pixels are turned upright as the file itself says, which outranks the orientation of EXIF (ISO/IEC 23008-12, section 6.5.10
-/// and annex A.2.3).
+/// and annex A.2.3). So do the numbers of its colors.
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
-    let fields = ExifFields::from_exif(&block::parsed(metadata(input)?.exif?)?);
-    Some(ExifFields { orientation: None, ..fields })
+    let Metadata { exif, color_info, .. } = metadata(input)?;
+    let fields = ExifFields { orientation: None, ..ExifFields::from_exif(&block::parsed(exif?)?) };
+    let says_colors = color_info.is_some_and(|color| names_primaries(color.color_primaries));
+    Some(if says_colors { fields.without_color_space() } else { fields })
 }
 
 pub(super) fn whole_fields(input: &mut Input, wanted: &[Tag]) -> Option<Vec<Field>> {

@@ -44,9 +44,11 @@ fn is_light(decoder: &mut TiffDecoder<'_>) -> bool {
     FirstPage::of(decoder).is_ok_and(|page| matches!(page.kind, PixelKind::Float(_)))
 }
 
-/// The EXIF library would read the whole file, pixels and all.
+/// The EXIF library would read the whole file, pixels and all. A color space in EXIF has a curve, and light has not.
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
-    ExifFields::from_tiff(&mut decoder(input).ok()?)
+    let mut decoder = decoder(input).ok()?;
+    let fields = ExifFields::from_tiff(&mut decoder)?;
+    Some(if is_light(&mut decoder) { fields.without_color_space() } else { fields })
 }
 
 pub(super) fn whole_fields(input: &mut Input, wanted: &[ExifTag]) -> Option<Vec<Field>> {
