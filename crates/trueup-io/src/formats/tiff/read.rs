@@ -3,7 +3,7 @@
 use std::io::{Read, Seek};
 
 use exif::{Field, Tag as ExifTag};
-use tiff::tags::Tag;
+use tiff::tags::{ExtraSamples, Tag};
 use trueup_core::raster::Photograph;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
@@ -15,6 +15,7 @@ use super::raw::{failure, is_raw};
 use super::samples::{Samples, TiffDecoder, decoder, not_as_stated, open};
 use crate::color::profile_of_light;
 use crate::format::{HeaderError, Input, StoredPixels};
+use crate::formats::alpha::straight;
 use crate::formats::decoded::{check_unchanged, damaged, eight, sixteen};
 use crate::formats::foreign::RAW;
 use crate::formats::linear_light::encoded;
@@ -55,6 +56,15 @@ pub(super) fn whole_fields(input: &mut Input, wanted: &[ExifTag]) -> Option<Vec<
     tiff_fields::read(&mut decoder(input).ok()?, wanted)
 }
 
+/// Whether colors are stored multiplied by their opacity.
+///
+/// # Source
+/// TIFF 6.0, section 18.
+fn has_associated_alpha(decoder: &mut TiffDecoder<'_>) -> bool {
+    let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples).ok().flatten().unwrap_or_default();
+    extra.first() == Some(&ExtraSamples::AssociatedAlpha.to_u16())
+}
+
 /// Decodes the first page.
 pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
     let reading = |error| Error::io("reading", &source.path, error);
@@ -77,12 +87,13 @@ pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograp
     }
     let mut decoder = open(source, &mut input)?;
     let samples = Samples::read(source, &mut decoder, page)?;
+    let is_premultiplied = has_associated_alpha(&mut decoder);
     match (page.kind, samples) {
         (PixelKind::Plain(channels), Samples::Eight(samples)) if samples.len() == width * height * channels => {
-            eight(width, height, channels, samples)
+            eight(width, height, channels, straight(samples, channels, is_premultiplied))
         }
         (PixelKind::Plain(channels), Samples::Sixteen(samples)) if samples.len() == width * height * channels => {
-            sixteen(width, height, channels, samples)
+            sixteen(width, height, channels, straight(samples, channels, is_premultiplied))
         }
         (PixelKind::Bitmap, Samples::Eight(packed)) => {
             eight(width, height, 1, unpacked(&packed, width, 1).map(|bit| bit * u8::MAX).collect())
@@ -94,6 +105,7 @@ pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograp
             sixteen(width, height, 3, rgb_of_cmyk(&samples, u16::MAX.into(), |value| value as u16))
         }
         (PixelKind::Float(channels), Samples::Float(samples)) => {
+            let samples = straight(samples, channels, is_premultiplied);
             sixteen(width, height, channels, encoded(&samples, channels, source.light))
         }
         (PixelKind::SmallGray(bits), Samples::Eight(packed)) => {

@@ -26,6 +26,7 @@ struct Form<'a> {
     palette: Option<&'a [u16]>,
     sampling: Option<[u16; 2]>,
     icc: Option<&'a [u8]>,
+    extra: Option<u16>,
     is_planar: bool,
     is_big: bool,
 }
@@ -62,6 +63,9 @@ fn tiff<T: TiffValue + ?Sized>(form: &Form<'_>, strips: &[&T]) -> Vec<u8> {
             }
             if let Some(icc) = form.icc {
                 directory.write_tag(Tag::IccProfile, icc).expect("written");
+            }
+            if let Some(extra) = form.extra {
+                directory.write_tag(Tag::ExtraSamples, extra).expect("written");
             }
             if form.is_planar {
                 directory.write_tag(Tag::PlanarConfiguration, 2_u16).expect("written");
@@ -211,6 +215,26 @@ fn few_bits_and_alpha_of_gray_are_spread() {
     let form = Form { photometric: 1, bits: &[16, 16], ..Form::default() };
     let samples: Vec<u16> = [300, 65_535].repeat(SIDE * SIDE);
     assert_eq!(sixteen(&decoded(&tiff(&form, &[&samples[..]]))).pixel(1, 1), [300, 300, 300, 65_535]);
+}
+
+/// ExtraSamples says 1 of colors multiplied by alpha, and 2 of such that are not (TIFF 6.0, section 18).
+#[test]
+fn colors_multiplied_by_alpha_are_divided_by_it() {
+    let pixels = SIDE * SIDE;
+    for (extra, expected) in [(1, [100, 50, 255, 51]), (2, [20, 10, 51, 51])] {
+        let form = Form { photometric: 2, bits: &[8; 4], extra: Some(extra), ..Form::default() };
+        let samples = [20_u8, 10, 51, 51].repeat(pixels);
+        assert_eq!(eight(&decoded(&tiff(&form, &[&samples[..]]))).pixel(3, 5), expected);
+    }
+    let form = Form { photometric: 2, bits: &[16; 4], extra: Some(1), ..Form::default() };
+    let samples = [2000_u16, 1000, 13_107, 13_107].repeat(pixels);
+    assert_eq!(sixteen(&decoded(&tiff(&form, &[&samples[..]]))).pixel(3, 5), [10_000, 5000, 65_535, 13_107]);
+    let form = Form { photometric: 1, bits: &[8, 8], ..form };
+    assert_eq!(eight(&decoded(&tiff(&form, &[&[20_u8, 51].repeat(pixels)[..]]))).pixel(3, 5), [100, 100, 100, 51]);
+    let form = Form { photometric: 2, bits: &[32; 4], format: Some(3), ..form };
+    let light = [0.125_f32, 0.25, 0.5, 0.5].repeat(pixels);
+    let [quarter, half, white] = ENCODED;
+    assert_eq!(sixteen(&decoded(&tiff(&form, &[&light[..]]))).pixel(3, 5), [quarter, half, white, 32_768]);
 }
 
 #[test]
