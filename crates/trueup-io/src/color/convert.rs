@@ -21,6 +21,8 @@ pub(crate) struct Conversion {
     pub(crate) rgb: Option<Arc<ColorProfile>>,
     /// From the curve of gray samples.
     pub(crate) gray: Option<TransferCurve>,
+    /// Whether the profile is one of gray. Gray that was spread over three channels, as beside alpha, follows it, too.
+    pub(crate) is_gray: bool,
     pub(crate) target: Arc<ColorProfile>,
     pub(crate) target_curve: TransferCurve,
 }
@@ -31,20 +33,23 @@ impl Conversion {
     /// # Errors
     /// [`Error::Input`] if the profile describes no conversion.
     pub(crate) fn apply(&self, photograph: Photograph, name: &str) -> Result<Photograph> {
-        match (photograph.channels(), &self.rgb, &self.gray) {
-            (1, _, Some(curve)) => Ok(self.convert_gray(&photograph, curve)?),
-            (1, _, None) | (_, None, _) => Ok(photograph),
-            (channels, Some(source), _) => {
-                let layout = if channels == 4 { Layout::Rgba } else { Layout::Rgb };
-                let transform = transform(source, &self.target, layout).map_err(|reason| {
-                    Error::input(name, format!("its ICC profile cannot be followed ({reason})"), "Convert it to sRGB.")
-                })?;
-                Ok(Photograph::Sixteen(match photograph {
-                    Photograph::Eight(raster) => convert(&raster, &*transform, |sample| u16::from(sample) * 257)?,
-                    Photograph::Sixteen(raster) => convert(&raster, &*transform, |sample| sample)?,
-                }))
-            }
+        let channels = photograph.channels();
+        if channels == 1 || self.is_gray && has_no_color(&photograph) {
+            // Gray is neutral in every space: only the curve differs.
+            return match &self.gray {
+                Some(curve) => relit(&photograph, curve, &self.target_curve, 1.0),
+                None => Ok(photograph),
+            };
         }
+        let Some(source) = &self.rgb else { return Ok(photograph) };
+        let layout = if channels == 4 { Layout::Rgba } else { Layout::Rgb };
+        let transform = transform(source, &self.target, layout).map_err(|reason| {
+            Error::input(name, format!("its ICC profile cannot be followed ({reason})"), "Convert it to sRGB.")
+        })?;
+        Ok(Photograph::Sixteen(match photograph {
+            Photograph::Eight(raster) => convert(&raster, &*transform, |sample| u16::from(sample) * 257)?,
+            Photograph::Sixteen(raster) => convert(&raster, &*transform, |sample| sample)?,
+        }))
     }
 
     /// Converts a photograph whose samples are light by `curve`, one that keeps what is brighter than white; alpha stays. Its profile
@@ -81,25 +86,17 @@ impl Conversion {
         });
         Ok(Photograph::Sixteen(raster))
     }
+}
 
-    /// Gray is neutral in every space: only the curve differs.
-    fn convert_gray(&self, photograph: &Photograph, curve: &TransferCurve) -> Result<Photograph> {
-        let (width, height) = (photograph.width(), photograph.height());
-        let table = |last: usize| -> Vec<u16> {
-            let level = |index: usize| self.target_curve.encoded(curve.linear(index as f64 / last as f64));
-            (0..=last).map(|index| (level(index) * 65535.0).round() as u16).collect()
-        };
-        let data = match photograph {
-            Photograph::Eight(raster) => {
-                let table = table(usize::from(u8::MAX));
-                raster.data().iter().map(|&sample| table[usize::from(sample)]).collect()
-            }
-            Photograph::Sixteen(raster) => {
-                let table = table(usize::from(u16::MAX));
-                raster.data().iter().map(|&sample| table[usize::from(sample)]).collect()
-            }
-        };
-        Ok(Photograph::Sixteen(Raster::from_data(width, height, 1, data)?))
+/// Whether all pixels have as much red as green and blue.
+fn has_no_color(photograph: &Photograph) -> bool {
+    fn is_neutral<T: Copy + Default + PartialEq + Sync>(raster: &Raster<T>) -> bool {
+        let is_gray = |pixel: &[T]| matches!(pixel, [red, green, blue, ..] if red == green && green == blue);
+        raster.data().par_chunks_exact(raster.channels().max(1)).all(is_gray)
+    }
+    match photograph {
+        Photograph::Eight(raster) => is_neutral(raster),
+        Photograph::Sixteen(raster) => is_neutral(raster),
     }
 }
 

@@ -33,12 +33,20 @@ struct Meaning {
     space: Option<RgbSpace>,
     /// The curve of gray samples.
     gray: TransferCurve,
+    /// Whether the file's profile is one of gray.
+    is_gray: bool,
     name: String,
 }
 
 impl Meaning {
     fn of_space(space: RgbSpace) -> Self {
-        Self { name: space.name(), gray: space.curve.clone(), profile: space.profile.clone(), space: Some(space) }
+        Self {
+            name: space.name(),
+            gray: space.curve.clone(),
+            is_gray: false,
+            profile: space.profile.clone(),
+            space: Some(space),
+        }
     }
 }
 
@@ -135,10 +143,10 @@ fn meaning(number: usize, source: &SourceImage) -> (Meaning, Option<Diagnostic>)
         Understood::Space(space) => (Meaning::of_space(space), None),
         Understood::Tables(profile) => {
             let name = description(&profile);
-            (Meaning { profile, space: None, gray: TransferCurve::SRGB, name }, None)
+            (Meaning { profile, space: None, gray: TransferCurve::SRGB, is_gray: false, name }, None)
         }
         // Gray samples say nothing of a gamut, and colors in the same file say nothing of themselves.
-        Understood::Gray(gray) => (Meaning { space: None, gray, ..srgb() }, None),
+        Understood::Gray(gray) => (Meaning { space: None, gray, is_gray: true, ..srgb() }, None),
         Understood::Foreign(kind) => {
             let finding = Diagnostic::note(
                 "color-profile-ignored",
@@ -172,6 +180,7 @@ fn conversion(meaning: &Meaning, space: &RgbSpace) -> Option<Conversion> {
     (rgb.is_some() || gray.is_some()).then(|| Conversion {
         rgb,
         gray,
+        is_gray: meaning.is_gray,
         target: space.profile.clone(),
         target_curve: space.curve.clone(),
     })

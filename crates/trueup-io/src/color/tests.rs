@@ -229,6 +229,21 @@ fn gray_photographs_keep_their_light() {
     assert!((f64::from(raster.pixel(3, 3)[0]) / 257.0 - 119.293).abs() < 0.1, "{:?}", raster.pixel(3, 3));
 }
 
+/// Gray with alpha is decoded to four channels.
+#[test]
+fn gray_with_alpha_keeps_its_light_and_colors_beside_a_gray_profile_theirs() {
+    let folder = TempDir::new().expect("a folder");
+    let icc = || ColorProfile::new_gray_with_gamma(1.8).encode().expect("a profile");
+    let path = folder.path().join("gray.png");
+    std::fs::write(&path, Specimen::eight(SIDE, SIDE, |_, _| [100, 51]).png(Some(icc()))).expect("written");
+    let (photographs, ..) = survey(&[path]);
+    let Photograph::Sixteen(raster) = photographs.photograph(0).expect("decodes") else { panic!("8 bits") };
+    assert_close(pixel(&photographs, 0).0, [119.293; 3], 0.1);
+    assert_eq!(raster.pixel(3, 3)[3], 51 * 257);
+    let (photographs, ..) = survey(&[png(&folder, "colors.png", Some(icc()))]);
+    assert_eq!(pixel(&photographs, 0), (COLOR.map(f64::from), false));
+}
+
 #[test]
 fn every_format_gives_back_the_profile_and_the_colors() {
     let folder = TempDir::new().expect("a folder");
