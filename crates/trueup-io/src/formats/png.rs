@@ -187,3 +187,24 @@ pub(crate) fn failure(error: EncodingError) -> WriteFailure {
         other => WriteFailure::Io(std::io::Error::other(other)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::{BufReader, Seek};
+
+    use super::*;
+    use crate::formats::specimens::Specimen;
+
+    /// A few bytes may stand for a profile as long as memory.
+    #[test]
+    fn headers_are_read_without_profiles() {
+        let bytes = Specimen::eight(24, 18, |_, _| [9; 3]).png(Some(vec![0; HEADER_BYTES + 1]));
+        let mut file = tempfile::tempfile().expect("a file");
+        file.write_all(&bytes).expect("written");
+        let mut input = BufReader::new(file);
+        input.rewind().expect("its start");
+        assert_eq!(header(&mut input).expect("a header").info().icc_profile, None);
+        input.rewind().expect("its start");
+        assert_eq!(icc(&mut input), None);
+    }
+}

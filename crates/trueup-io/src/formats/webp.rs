@@ -7,7 +7,7 @@ use trueup_core::raster::{Photograph, RowSource};
 use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 
-use super::decoded::{check_unchanged, damaged, eight, sample_count};
+use super::decoded::{HEADER_BYTES, check_unchanged, damaged, eight, sample_count};
 use crate::encode::failure::WriteFailure;
 use crate::encode::metadata::Metadata;
 use crate::encode::options::{Depth, OutputOptions};
@@ -31,7 +31,7 @@ pub(crate) static WEBP: Format = Format {
         kinds: "lossy and lossless",
         has_signature: |start| start.starts_with(b"RIFF") && start.get(8..12) == Some(b"WEBP"),
         stored,
-        icc: |input| WebPDecoder::new(input).ok()?.icc_profile().ok().flatten(),
+        icc,
         exif: embedded::read_exif,
         whole_fields: embedded::read_fields,
         pixels,
@@ -53,6 +53,13 @@ fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
     let decoder = WebPDecoder::new(input).map_err(HeaderError::damaged)?;
     let (width, height) = decoder.dimensions();
     Ok(StoredPixels { width: width as usize, height: height as usize, bits: 8, is_float: false })
+}
+
+/// The profile, if it is no longer than a header may be: room for it is made before it is read.
+fn icc(input: &mut Input) -> Option<Vec<u8>> {
+    let mut decoder = WebPDecoder::new(input).ok()?;
+    decoder.set_memory_limit(HEADER_BYTES);
+    decoder.icc_profile().ok().flatten()
 }
 
 fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
@@ -96,4 +103,36 @@ pub(super) fn write(
     encoder.encode(&pixels, picture.width() as u32, picture.height() as u32, color).map_err(std::io::Error::other)?;
     output.flush()?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{BufReader, Seek, SeekFrom};
+
+    use super::*;
+
+    /// A file of which only the beginning takes room on the disk.
+    #[test]
+    fn a_profile_is_no_longer_than_a_header_may_be() {
+        let of_length = |length: usize| {
+            let mut file = tempfile::tempfile().expect("a file");
+            // What the whole is long, an extended header of 24 x 18 pixels with a profile (RFC 9649 2.7), and the profile.
+            let head = [
+                &b"RIFF"[..],
+                &(length as u32 + 30).to_le_bytes(),
+                b"WEBPVP8X\x0a\0\0\0\x20\0\0\0\x17\0\0\x11\0\0ICCP",
+                &(length as u32).to_le_bytes(),
+            ];
+            file.write_all(&head.concat()).expect("written");
+            let profile_end = head.concat().len() + length;
+            file.set_len(profile_end as u64).expect("as long");
+            file.seek(SeekFrom::Start(profile_end as u64)).expect("its end");
+            // A lossless picture, of which nothing but the header is looked at.
+            file.write_all(b"VP8L\x06\0\0\0\x2f\x17\x40\x04\0\0").expect("written");
+            file.rewind().expect("its start");
+            icc(&mut BufReader::new(file)).map(|icc| icc.len())
+        };
+        assert_eq!(of_length(400), Some(400));
+        assert_eq!(of_length(HEADER_BYTES + 2), None);
+    }
 }
