@@ -100,12 +100,16 @@ pub(super) fn write_pages(
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
     context.progress().begin(OutputOptions::STAGE, set.count() as u64);
     let form = PageForm::of_layers(options);
-    // Pages as large as the panorama take room for the layers alone: empty tiles are stored once.
-    let is_big = form.is_big(set.pixels(), options);
-    write_each(&mut TiffPages::begin(&mut output, is_big)?, set, metadata, options, form, context)?;
+    write_each(&mut TiffPages::begin(&mut output, is_big(set, form, options))?, set, metadata, options, form, context)?;
     output.flush()?;
     context.progress().finish(OutputOptions::STAGE);
     Ok(())
+}
+
+/// Whether the file could become so large that its offsets need 64 bits.
+fn is_big(set: &dyn LayerSet, form: PageForm, options: &OutputOptions) -> bool {
+    let are_whole = options.layer_extent == LayerExtent::Canvas;
+    form.is_big(form.pixels_of_layers(set.pixels(), set.count(), set.whole(), are_whole), options)
 }
 
 fn write_each(
@@ -184,5 +188,46 @@ impl RowSource for OnCanvas<'_> {
     }
     fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
         self.row(y, row, |y, row| self.layer.linear_row(y, row))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::encode::options::{TiffCompression, TiffLayout};
+
+    /// Ten small layers on a panorama of 400 megapixels, which with alpha takes 1.6 GB.
+    struct Few;
+
+    impl LayerSet for Few {
+        fn whole(&self) -> [usize; 2] {
+            [40_000, 10_000]
+        }
+        fn count(&self) -> usize {
+            10
+        }
+        fn pixels(&self) -> u64 {
+            10 * 1_000 * 1_000
+        }
+        fn open(&self, _: usize) -> Result<LayerPage<'_>> {
+            Err(Error::input("layer", "it is not there", ""))
+        }
+    }
+
+    #[test]
+    fn pages_that_are_written_whole_count_whole() {
+        let whole = OutputOptions {
+            layer_extent: LayerExtent::Canvas,
+            tiff_layout: TiffLayout::Strips,
+            tiff_compression: TiffCompression::None,
+            ..OutputOptions::default()
+        };
+        let is_big = |options: &OutputOptions| is_big(&Few, PageForm::of_layers(options), options);
+        assert!(is_big(&whole), "16 GB");
+        assert!(!is_big(&OutputOptions { layer_extent: LayerExtent::Cropped, ..whole.clone() }));
+        assert!(!is_big(&OutputOptions { tiff_layout: TiffLayout::Tiles256, ..whole.clone() }));
+        assert!(!is_big(&OutputOptions { tiff_compression: TiffCompression::Deflate, ..whole.clone() }));
+        // Each layer reaches into no more tiles of 512 than lie along the sides of the panorama.
+        assert!(!is_big(&OutputOptions { tiff_layout: TiffLayout::Tiles512, ..whole }));
     }
 }

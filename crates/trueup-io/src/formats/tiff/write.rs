@@ -40,7 +40,7 @@ pub(crate) fn write(
 ) -> Result<(), WriteFailure> {
     let form = PageForm::of(picture, options);
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
-    let is_big = form.is_big(picture.width() as u64 * picture.height() as u64, options);
+    let is_big = form.is_big(form.pixels_in_blocks([picture.width(), picture.height()]), options);
     TiffPages::begin(&mut output, is_big)?.add(picture, metadata, form, None, context)?;
     output.flush()?;
     Ok(())
@@ -112,6 +112,32 @@ impl PageForm {
         let deflate = options.tiff_compression == TiffCompression::Deflate;
         let blocks = BlockForm { depth: options.depth, channels, deflate, background: options.background };
         Self { blocks, tile, overviews: options.tiff_overviews && tile.is_some() }
+    }
+
+    /// Pixels that the blocks of a page of this size hold: tiles reach over its borders.
+    fn pixels_in_blocks(&self, size: [usize; 2]) -> u64 {
+        let [width, height] = size.map(|side| side.next_multiple_of(self.tile.unwrap_or(1)) as u64);
+        width.saturating_mul(height)
+    }
+
+    /// Most pixels that take room of so many layers, which have `pixels` together, on a panorama of this size; `are_whole` says that their
+    /// pages are as large as that.
+    pub(crate) fn pixels_of_layers(&self, pixels: u64, count: usize, whole: [usize; 2], are_whole: bool) -> u64 {
+        let count = count as u64;
+        let all = self.pixels_in_blocks(whole).saturating_mul(count);
+        match self.tile {
+            // Where nothing is, next to nothing is left of it by compression.
+            _ if self.blocks.deflate => pixels,
+            None if are_whole => all,
+            None => pixels,
+            // Empty tiles are stored once, those that a layer reaches into whole: at two of its sides, or at four if it lies on the panorama.
+            Some(side) => {
+                let reach = side as u64 * if are_whole { 2 } else { 1 };
+                let sides = whole[0] as u64 + whole[1] as u64;
+                let beyond = reach.saturating_mul(sides.saturating_add(reach)).saturating_mul(count);
+                all.min(pixels.saturating_add(beyond))
+            }
+        }
     }
 
     /// Whether the offsets of a file with so many pixels need 64 bits.
