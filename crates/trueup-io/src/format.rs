@@ -56,8 +56,9 @@ pub(crate) struct Reading {
     /// The pixels as they are stored, made smaller by the decoder itself, for people to look at; `None` if decoders of this format
     /// cannot do that.
     pub(crate) reduced: Option<ReducedPixels>,
-    /// Bytes of a pixel on its way into memory: in the decoder, and in the photograph beside it.
-    pub(crate) pixel_bytes: usize,
+    /// Bytes of a pixel on its way into memory: in the decoder, and in the photograph beside it. Of a file whose header cannot be read it
+    /// does not matter.
+    pub(crate) pixel_bytes: fn(&mut Input) -> usize,
 }
 
 /// Decodes a photograph as it is stored, with both sides divided by the same 1, 2, 4 or 8 and rounded up, of at least the given columns
@@ -95,6 +96,11 @@ impl Reading {
     /// What the field `whole_fields` reads.
     pub(crate) fn whole_fields(&self, input: &mut Input, wanted: &[Tag]) -> Option<Vec<Field>> {
         contained(|| (self.whole_fields)(input, wanted)).unwrap_or_default()
+    }
+
+    /// What the field `pixel_bytes` says.
+    pub(crate) fn pixel_bytes(&self, input: &mut Input) -> usize {
+        contained(|| (self.pixel_bytes)(input)).unwrap_or(PLAIN_PIXEL_BYTES)
     }
 
     /// What the field `pixels` reads.
@@ -283,7 +289,7 @@ mod tests {
             whole_fields: |_, _| panic!("fields"),
             pixels: |_, _| panic!("pixels"),
             reduced: None,
-            pixel_bytes: PLAIN_PIXEL_BYTES,
+            pixel_bytes: |_| PLAIN_PIXEL_BYTES,
         };
         let stored = broken.stored(&mut input).map_err(|error| error.words().to_owned());
         assert_eq!(stored, Err("its decoder broke down".to_owned()));

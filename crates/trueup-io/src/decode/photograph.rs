@@ -1,7 +1,7 @@
 //! Whole photographs.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Seek};
 
 use trueup_core::memory::check_room;
 use trueup_core::raster::Photograph;
@@ -50,7 +50,7 @@ pub fn sample_bits(source: &SourceImage) -> Result<u16> {
 /// hold several planes of 32 bits. A file that cannot be read counts for nothing.
 pub fn decoding_surplus(sources: &[SourceImage]) -> usize {
     let surplus = |source: &SourceImage| {
-        let pixel_bytes = header::open(&source.path).map_or(0, |(_, format)| format.pixel_bytes);
+        let pixel_bytes = header::open(&source.path).map_or(0, |(mut input, format)| format.pixel_bytes(&mut input));
         let [width, height] = source.picture_size();
         let pixels = width.saturating_mul(height);
         pixels.saturating_mul(pixel_bytes.saturating_sub(PLAIN_PIXEL_BYTES))
@@ -80,7 +80,8 @@ fn opened(source: &SourceImage) -> Result<(&'static Reading, Input)> {
         Error::input(&source.name, reason, "Give the photograph again.")
     })?;
     let [width, height] = source.picture_size();
-    let room = width.saturating_mul(height).saturating_mul(format.pixel_bytes);
+    let room = width.saturating_mul(height).saturating_mul(format.pixel_bytes(&mut input));
     check_room(format_args!("decoding {}", source.name), room)?;
+    input.rewind().map_err(reading)?;
     Ok((format, input))
 }

@@ -7,7 +7,7 @@ use trueup_core::{Error, Result};
 /// Memory a decoder may take beside its pixels, in bytes.
 pub(crate) const DECODER_SLACK_BYTES: u64 = 64 << 20;
 
-/// Most bytes a pixel takes in memory while it is decoded: four 32-bit samples.
+/// Most bytes a pixel takes in memory while it is decoded, of most formats: four 32-bit samples.
 pub(crate) const MAX_PIXEL_BYTES: u64 = 16;
 
 /// Memory that reading a header may take, in bytes: profiles may be compressed.
@@ -15,9 +15,14 @@ pub(crate) const HEADER_BYTES: usize = 64 << 20;
 
 /// Most bytes a decoder may take for this photograph.
 pub(crate) fn decoding_limit(source: &SourceImage) -> u64 {
+    decoding_limit_of(source, MAX_PIXEL_BYTES)
+}
+
+/// The same where a pixel takes so many.
+pub(crate) fn decoding_limit_of(source: &SourceImage, pixel_bytes: u64) -> u64 {
     let [width, height] = source.picture_size().map(|length| length as u64);
     let pixels = width.saturating_mul(height);
-    pixels.saturating_mul(MAX_PIXEL_BYTES).saturating_add(DECODER_SLACK_BYTES)
+    pixels.saturating_mul(pixel_bytes).saturating_add(DECODER_SLACK_BYTES)
 }
 
 /// How many samples a photograph of this size has.

@@ -41,7 +41,7 @@ pub(crate) static PNG: Format = Format {
         whole_fields: embedded::read_fields,
         pixels,
         reduced: None,
-        pixel_bytes: PLAIN_PIXEL_BYTES,
+        pixel_bytes: |_| PLAIN_PIXEL_BYTES,
     }),
     writing: Some(Writing {
         depths: &[Depth::Eight, Depth::Sixteen],

@@ -24,7 +24,7 @@ pub(crate) static AVIF: Format = Format {
         whole_fields: read::whole_fields,
         pixels: read::pixels,
         reduced: None,
-        pixel_bytes: read::PIXEL_BYTES,
+        pixel_bytes: |_| read::PIXEL_BYTES,
     }),
     writing: None,
 };

@@ -34,7 +34,7 @@ pub(crate) static DNG: Format = Format {
         whole_fields: read::whole_fields,
         pixels: read::pixels,
         reduced: None,
-        pixel_bytes: read::PIXEL_BYTES,
+        pixel_bytes: |_| read::PIXEL_BYTES,
     }),
     writing: None,
 };

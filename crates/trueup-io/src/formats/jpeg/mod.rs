@@ -28,7 +28,7 @@ pub(crate) static JPEG: Format = Format {
         whole_fields: embedded::read_fields,
         pixels: read::pixels,
         reduced: Some(reduced::pixels),
-        pixel_bytes: PLAIN_PIXEL_BYTES,
+        pixel_bytes: |_| PLAIN_PIXEL_BYTES,
     }),
     writing: Some(Writing {
         depths: &[Depth::Eight],

@@ -27,7 +27,7 @@ pub(crate) static OPEN_EXR: Format = Format {
         whole_fields: |_, _| None,
         pixels: read::pixels,
         reduced: None,
-        pixel_bytes: read::PIXEL_BYTES,
+        pixel_bytes: |_| read::PIXEL_BYTES,
     }),
     writing: Some(Writing {
         depths: &[Depth::Float],

@@ -16,7 +16,7 @@ pub(crate) mod write;
 
 use super::foreign::is_cr2;
 use crate::encode::options::{Depth, TiffCompression};
-use crate::format::{Format, LOSSLESS_BYTES, PLAIN_PIXEL_BYTES, Reading, Transparency, Writer, Writing};
+use crate::format::{Format, LOSSLESS_BYTES, Reading, Transparency, Writer, Writing};
 
 /// The declaration.
 ///
@@ -39,7 +39,7 @@ pub(crate) static TIFF: Format = Format {
         whole_fields: read::whole_fields,
         pixels: read::pixels,
         reduced: None,
-        pixel_bytes: PLAIN_PIXEL_BYTES,
+        pixel_bytes: read::pixel_bytes,
     }),
     writing: Some(Writing {
         depths: &[Depth::Eight, Depth::Sixteen, Depth::Float],

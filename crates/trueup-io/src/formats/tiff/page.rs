@@ -9,6 +9,8 @@ use tiff::decoder::Decoder;
 use tiff::tags::{CompressionMethod, PhotometricInterpretation, SampleFormat, Tag};
 use tiff::{ColorType, TiffError, TiffResult};
 
+use crate::format::PLAIN_PIXEL_BYTES;
+
 /// What a TIFF's first page holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FirstPage {
@@ -41,6 +43,28 @@ pub(super) enum PixelKind {
 }
 
 impl FirstPage {
+    /// Bytes of a pixel as the decoder hands it out.
+    pub(super) fn decoded_pixel_bytes(&self) -> usize {
+        let samples = match self.kind {
+            PixelKind::Plain(samples) | PixelKind::Float(samples) => samples,
+            PixelKind::Cmyk | PixelKind::Wide => 4,
+            PixelKind::YCbCr => 3,
+            PixelKind::Bitmap | PixelKind::Palette(_) | PixelKind::SmallGray(_) => 1,
+        };
+        samples * usize::from(self.bits / 8)
+    }
+
+    /// Bytes of a pixel on its way into memory.
+    pub(super) fn pixel_bytes(&self) -> usize {
+        let beside = match self.kind {
+            // Numbers of 32 bits are made of the others, and samples of 16 bits of these; planes are put together in as much room.
+            PixelKind::Float(samples) => samples * size_of::<f32>(),
+            PixelKind::Cmyk => 3 * usize::from(self.bits / 8),
+            _ => 0,
+        };
+        PLAIN_PIXEL_BYTES.max(self.decoded_pixel_bytes() + beside)
+    }
+
     /// Looks at the first page of a file.
     pub(super) fn of<R: Read + Seek>(decoder: &mut Decoder<R>) -> TiffResult<Self> {
         let (width, height) = decoder.dimensions()?;
@@ -104,4 +128,22 @@ fn check_color_resolution<R: Read + Seek>(decoder: &mut Decoder<R>) -> TiffResul
 
 fn unsupported(color: ColorType) -> TiffError {
     TiffError::UnsupportedError(tiff::TiffUnsupportedError::UnsupportedColorType(color))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn floating_point_takes_its_room_and_that_of_what_is_made_of_it() {
+        let bytes = |bits, kind| FirstPage { width: 3, height: 2, bits, kind }.pixel_bytes();
+        assert_eq!(bytes(32, PixelKind::Float(3)), 3 * (4 + 4));
+        assert_eq!(bytes(64, PixelKind::Float(4)), 4 * (8 + 4));
+        assert_eq!(bytes(16, PixelKind::Float(1)), PLAIN_PIXEL_BYTES);
+        assert_eq!(bytes(16, PixelKind::Cmyk), 4 * 2 + 3 * 2);
+        for plain in [PixelKind::Plain(4), PixelKind::Plain(1), PixelKind::YCbCr, PixelKind::Palette(8)] {
+            assert_eq!(bytes(8, plain), PLAIN_PIXEL_BYTES, "{plain:?}");
+        }
+        assert_eq!(bytes(16, PixelKind::Plain(4)), PLAIN_PIXEL_BYTES);
+    }
 }

@@ -16,13 +16,13 @@ use crate::formats::decoded::{damaged, eight};
 /// Indices into a palette. The decoder reads no palettes; told that the indices are gray, it reads those.
 pub(super) fn decode(source: &SourceImage, mut bytes: Vec<u8>, page: FirstPage, bits: u8) -> Result<Photograph> {
     let failed = |error: TiffError| damaged(source, error);
-    let colors = open(source, &mut Cursor::new(&bytes))?.get_tag_u16_vec(Tag::ColorMap).map_err(failed)?;
+    let colors = open(source, page, &mut Cursor::new(&bytes))?.get_tag_u16_vec(Tag::ColorMap).map_err(failed)?;
     let count = 1_usize << bits;
     if colors.len() != 3 * count || call_gray(&mut bytes).is_none() {
         return Err(damaged(source, "its palette is not as long as it must be"));
     }
     let mut input = Cursor::new(&bytes);
-    let mut decoder = open(source, &mut input)?;
+    let mut decoder = open(source, page, &mut input)?;
     let Samples::Eight(packed) = Samples::read(source, &mut decoder, page)? else {
         return Err(not_as_stated(source));
     };

@@ -14,7 +14,7 @@ use super::palette;
 use super::raw::{failure, is_raw};
 use super::samples::{Samples, TiffDecoder, decoder, not_as_stated, open};
 use crate::color::profile_of_light;
-use crate::format::{HeaderError, Input, StoredPixels};
+use crate::format::{HeaderError, Input, PLAIN_PIXEL_BYTES, StoredPixels};
 use crate::formats::alpha::straight;
 use crate::formats::decoded::{check_unchanged, damaged, eight, sixteen};
 use crate::formats::foreign::RAW;
@@ -56,6 +56,11 @@ pub(super) fn whole_fields(input: &mut Input, wanted: &[ExifTag]) -> Option<Vec<
     tiff_fields::read(&mut decoder(input).ok()?, wanted)
 }
 
+pub(super) fn pixel_bytes(input: &mut Input) -> usize {
+    let page = decoder(input).and_then(|mut decoder| FirstPage::of(&mut decoder));
+    page.map_or(PLAIN_PIXEL_BYTES, |page| page.pixel_bytes())
+}
+
 /// Whether colors are stored multiplied by their opacity.
 ///
 /// # Source
@@ -85,7 +90,7 @@ pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograp
             "Export it with 8 or 16 bits a sample.",
         ));
     }
-    let mut decoder = open(source, &mut input)?;
+    let mut decoder = open(source, page, &mut input)?;
     let samples = Samples::read(source, &mut decoder, page)?;
     let is_premultiplied = has_associated_alpha(&mut decoder);
     match (page.kind, samples) {

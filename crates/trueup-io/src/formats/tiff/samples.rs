@@ -7,7 +7,7 @@ use trueup_core::{Error, Result};
 
 use super::page::{FirstPage, PixelKind};
 use super::texts::{TiffInput, WithoutAbsurdTexts};
-use crate::formats::decoded::{damaged, decoding_limit};
+use crate::formats::decoded::{MAX_PIXEL_BYTES, damaged, decoding_limit_of};
 
 /// A decoder of a file as it can be read.
 pub(super) type TiffDecoder<'a> = Decoder<WithoutAbsurdTexts<'a>>;
@@ -17,13 +17,22 @@ pub(super) fn decoder(input: &mut dyn TiffInput) -> TiffResult<TiffDecoder<'_>> 
     Decoder::new(WithoutAbsurdTexts::of(input)?)
 }
 
-/// A decoder that takes no more memory than the photograph needs.
-pub(super) fn open<'a>(source: &SourceImage, input: &'a mut dyn TiffInput) -> Result<TiffDecoder<'a>> {
-    let bytes = usize::try_from(decoding_limit(source)).unwrap_or(usize::MAX);
+/// A decoder that takes no more memory than the photograph needs, whose first page is `page`.
+pub(super) fn open<'a>(
+    source: &SourceImage,
+    page: FirstPage,
+    input: &'a mut dyn TiffInput,
+) -> Result<TiffDecoder<'a>> {
+    let bytes = usize::try_from(limit(source, page)).unwrap_or(usize::MAX);
     let mut limits = Limits::default();
     limits.decoding_buffer_size = bytes;
     limits.intermediate_buffer_size = bytes;
     Ok(decoder(input).map_err(|error| damaged(source, error))?.with_limits(limits))
+}
+
+/// Most bytes that the decoder may take; four numbers of 64 bits take twice as much as other formats have.
+fn limit(source: &SourceImage, page: FirstPage) -> u64 {
+    decoding_limit_of(source, MAX_PIXEL_BYTES.max(page.decoded_pixel_bytes() as u64))
 }
 
 /// All samples of a photograph, channels interleaved; bits below 8 packed.
@@ -72,4 +81,20 @@ fn interleaved<T: Copy>(samples: Vec<T>, pixels: usize, planes: usize) -> Vec<T>
 /// The samples are of another kind or number than the header says.
 pub(super) fn not_as_stated(source: &SourceImage) -> Error {
     damaged(source, "its samples are not what its header says")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_of_64_bits_a_sample_are_within_the_limit() {
+        let [width, height] = [6000, 4000];
+        let source = SourceImage::unknown("photograph", "photograph", [width, height]);
+        let limit = |bits, kind| limit(&source, FirstPage { width, height, bits, kind });
+        let pixels = (width * height) as u64;
+        assert!(limit(64, PixelKind::Float(3)) >= 24 * pixels);
+        assert!(limit(64, PixelKind::Float(4)) >= 32 * pixels);
+        assert!(limit(8, PixelKind::Plain(3)) < 20 * pixels);
+    }
 }
