@@ -151,6 +151,9 @@ fn what_the_codec_says_of_orientation_counts() {
         let (_folder, source, decoded) = read(pair.file);
         let (_folder, _, expected) = read(pair.elsewhere);
         assert_eq!((source.width, source.height, source.orientation), (HEIGHT, WIDTH, 1));
+        let (mut input, reading) = open(&source.path).expect("a file");
+        let fields = reading.exif(&mut input).expect("EXIF");
+        assert_eq!((fields.orientation, fields.turned_by), (None, Some(6)));
         let found = difference(&decoded, |x, y, c| level_at(&expected, x, y, c));
         assert!(found == 0.0, "{found}");
         // Twice compressed with loss; a wrong turn would be 50 levels and more.

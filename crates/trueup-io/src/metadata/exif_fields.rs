@@ -39,6 +39,9 @@ const STITCHERS: [&str; 7] =
 pub(crate) struct ExifFields {
     /// Orientation, 1 to 8 where valid.
     pub(crate) orientation: Option<u32>,
+    /// The orientation that was recorded, where the file says itself how its pixels are turned, and this is not applied: gravity was recorded
+    /// before that turn.
+    pub(crate) turned_by: Option<u32>,
     /// PixelXDimension, pixels. Tools that reduce a photograph often leave it at the original's size.
     pub(crate) pixel_width: Option<f64>,
     /// PixelYDimension, pixels.
@@ -92,6 +95,7 @@ impl ExifFields {
         };
         Self {
             orientation: value(Tag::Orientation).and_then(|value| value.get_uint(0)),
+            turned_by: None,
             pixel_width: number(Tag::PixelXDimension),
             pixel_height: number(Tag::PixelYDimension),
             focal_mm: number(Tag::FocalLength),
@@ -152,6 +156,11 @@ impl ExifFields {
         fields.custom_rendered = number(CUSTOM_RENDERED).map(|rendered| rendered as u32);
         fields.focal_plane_unit = number(FOCAL_PLANE_RESOLUTION_UNIT).map(|unit| unit as u32);
         Some(fields)
+    }
+
+    /// The same of a file whose pixels are turned as it says itself.
+    pub(crate) fn turned_already(self) -> Self {
+        Self { orientation: None, turned_by: self.orientation, ..self }
     }
 
     /// The same without a color space: of a file that says itself what its colors are, or whose pixels are handed out in others.

@@ -54,14 +54,17 @@ fn apple(exif: &ExifFields, order: PixelOrder) -> Option<[f64; 3]> {
     }
     let on_sensor = [-y / length, -x / length, -z / length];
     let PixelOrder { stored: [width, height], stated, applied } = order;
+    // Where the file itself says how it is turned, both are 1, and the turn is the one that EXIF recorded.
+    let turned_by = exif.turned_by.and_then(|tag| u8::try_from(tag).ok());
     // Sensors are wider than tall: a program turned taller pixels, as the tag says that it left, or by a quarter that put the
     // picture upright.
-    let shown = match (height > width, stated) {
-        (true, 5..=8) => shown(on_sensor, stated),
+    let shown = match (height > width, turned_by.unwrap_or(stated)) {
+        (true, tag @ 5..=8) => shown(on_sensor, tag),
         (true, _) => {
             let [clockwise, counterclockwise] = [6, 8].map(|tag| shown(on_sensor, tag));
             if clockwise[1] >= counterclockwise[1] { clockwise } else { counterclockwise }
         }
+        (false, tag @ 2..=4) if turned_by.is_some() => shown(on_sensor, tag),
         (false, 1) if on_sensor[1] < ON_ITS_HEAD => shown(on_sensor, 3),
         (false, _) => shown(on_sensor, applied),
     };
@@ -135,6 +138,24 @@ mod tests {
         assert_close(down([cosine, 0.0, -sine], [4032, 3024], 1, 1), upright);
         // The tag lost, the pixels as the sensor has them: the picture lies on its side.
         assert_close(down(vector, [4032, 3024], 1, 1), [cosine, 0.0, sine]);
+    }
+
+    /// Held on its head, and tilted so far that up hardly shows in the picture: what the file turned it by is what EXIF recorded.
+    #[test]
+    fn what_the_file_turned_itself_is_turned_as_recorded() {
+        let (sine, cosine) = 50_f64.to_radians().sin_cos();
+        let of = |vector: [f64; 3], turned_by: u32, stored: [usize; 2]| {
+            let exif = ExifFields { turned_by: Some(turned_by), ..exif(vector) };
+            recorded_gravity(&exif, PixelOrder { stored, stated: 1, applied: 1 }).expect("down").down
+        };
+        let upright = [0.0, cosine, sine];
+        assert_close(of([cosine, 0.0, -sine], 3, [4032, 3024]), upright);
+        assert_close(of([-cosine, 0.0, -sine], 1, [4032, 3024]), upright);
+        assert_close(of([0.0, -cosine, -sine], 6, [3024, 4032]), upright);
+        assert_close(of([0.0, cosine, -sine], 8, [3024, 4032]), upright);
+        // A turn that the picture's sides contradict, and one that is none.
+        assert_close(of([-cosine, 0.0, -sine], 6, [4032, 3024]), upright);
+        assert_close(of([-cosine, 0.0, -sine], 9, [4032, 3024]), upright);
     }
 
     #[test]

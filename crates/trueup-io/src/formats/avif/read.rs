@@ -337,7 +337,7 @@ pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
     let bytes = contents(input, READING).ok()?;
     let described = described(&bytes).ok()?;
-    let fields = ExifFields { orientation: None, ..ExifFields::from_exif(&block::parsed(described.exif()?)?) };
+    let fields = ExifFields::from_exif(&block::parsed(described.exif()?)?).turned_already();
     let says_colors = described.code_points.is_some_and(|points| names_primaries(points.primaries));
     Some(if says_colors { fields.without_color_space() } else { fields })
 }

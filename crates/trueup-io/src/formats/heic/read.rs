@@ -99,7 +99,7 @@ pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
 /// and annex A.2.3). So do the numbers of its colors.
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
     let Metadata { exif, color_info, .. } = metadata(input)?;
-    let fields = ExifFields { orientation: None, ..ExifFields::from_exif(&block::parsed(exif?)?) };
+    let fields = ExifFields::from_exif(&block::parsed(exif?)?).turned_already();
     let says_colors = color_info.is_some_and(|color| names_primaries(color.color_primaries));
     Some(if says_colors { fields.without_color_space() } else { fields })
 }

@@ -134,8 +134,8 @@ fn has_profile(encoding: &EnumColourEncoding) -> bool {
 /// The pixels are turned upright with the codestream's own orientation, which outranks that of EXIF (ISO/IEC 18181-2,
 /// section 9.6). What colors are it always says itself, too.
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
-    let fields = ExifFields::from_exif(&block::parsed(container::exif(input)?)?).without_color_space();
-    Some(ExifFields { orientation: None, ..fields })
+    let fields = ExifFields::from_exif(&block::parsed(container::exif(input)?)?);
+    Some(fields.turned_already().without_color_space())
 }
 
 pub(super) fn whole_fields(input: &mut Input, wanted: &[Tag]) -> Option<Vec<Field>> {
