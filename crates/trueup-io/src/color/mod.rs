@@ -21,6 +21,9 @@ mod tests;
 
 pub(crate) use convert::{Conversion, relit};
 pub use icc::srgb_profile;
-pub(crate) use named::{Chromaticities, names_primaries, profile_of_chromaticities, profile_of_code_points, profile_of_light};
+pub(crate) use named::{
+    Chromaticities, NamedSpace, names_primaries, profile_of_chromaticities, profile_of_code_points, profile_of_light,
+    space_of_code_points,
+};
 pub(crate) use rows::InSrgb;
 pub use survey::PhotographColors;

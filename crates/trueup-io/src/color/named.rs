@@ -43,6 +43,25 @@ impl Chromaticities {
     }
 }
 
+/// What code points say of colors.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum NamedSpace {
+    Srgb,
+    /// A space of this profile.
+    Other(Vec<u8>),
+    /// None that is known.
+    Unknown,
+}
+
+/// What code points of ITU-T H.273 say where they are all that is said, or more than other things that are.
+pub(crate) fn space_of_code_points(primaries: u16, transfer: u16) -> NamedSpace {
+    match profile_of_code_points(primaries, transfer) {
+        Some(icc) => NamedSpace::Other(icc),
+        None if names_primaries(primaries) && is_srgb(primaries, transfer) => NamedSpace::Srgb,
+        None => NamedSpace::Unknown,
+    }
+}
+
 /// Whether a code point of primaries says anything.
 pub(crate) fn names_primaries(primaries: u16) -> bool {
     primaries != UNSPECIFIED
@@ -53,9 +72,8 @@ pub(crate) fn names_primaries(primaries: u16) -> bool {
 /// # Source
 /// ITU-T H.273, tables 2 (primaries) and 3 (transfer characteristics).
 pub(crate) fn profile_of_code_points(primaries: u16, transfer: u16) -> Option<Vec<u8>> {
-    let primaries = if primaries == UNSPECIFIED { PRIMARIES_OF_SRGB } else { primaries };
-    let transfer = if CURVES_OF_VIDEO.contains(&transfer) { CURVE_OF_SRGB } else { transfer };
-    if (primaries, transfer) == (PRIMARIES_OF_SRGB, CURVE_OF_SRGB) {
+    let [primaries, transfer] = meant(primaries, transfer);
+    if is_srgb(primaries, transfer) {
         return None;
     }
     let cicp = CicpProfile {
@@ -72,6 +90,16 @@ pub(crate) fn profile_of_code_points(primaries: u16, transfer: u16) -> Option<Ve
     profile.cicp.as_ref()?;
     let name = format!("primaries {primaries}, transfer {transfer} of H.273");
     Some(compact(profile, &name).to_vec())
+}
+
+/// The code points of the space in which screens show what is said to be in these.
+fn meant(primaries: u16, transfer: u16) -> [u16; 2] {
+    let primaries = if primaries == UNSPECIFIED { PRIMARIES_OF_SRGB } else { primaries };
+    [primaries, if CURVES_OF_VIDEO.contains(&transfer) { CURVE_OF_SRGB } else { transfer }]
+}
+
+fn is_srgb(primaries: u16, transfer: u16) -> bool {
+    meant(primaries, transfer) == [PRIMARIES_OF_SRGB, CURVE_OF_SRGB]
 }
 
 /// The profile of samples with sRGB's curve and these primaries; `None` if they are sRGB's.

@@ -175,6 +175,22 @@ fn exif_is_not_asked_where_a_png_says_that_it_is_srgb() {
     let camera = with_chunk(&plain, b"eXIf", &exif_of_adobe_rgb());
     assert!(!surveyed(&camera).is_srgb());
     assert!(surveyed(&with_chunk(&camera, b"sRGB", &[0])).is_srgb());
+    assert!(surveyed(&with_chunk(&camera, b"cICP", &[1, 13, 0, 1])).is_srgb());
+}
+
+/// Code points of Display P3 are 12 and 13, of sRGB 1 and 13, unspecified ones 2 (ITU-T H.273, tables 2 and 3).
+#[test]
+fn code_points_of_a_png_count_before_its_profile() {
+    let of = |icc: Option<Vec<u8>>, points: [u8; 4]| {
+        let plain = Specimen::eight(SIDE, SIDE, |_, _| COLOR).png(icc);
+        surveyed(&with_chunk(&plain, b"cICP", &points)).name()
+    };
+    assert_eq!(of(None, [12, 13, 0, 1]), "primaries 12, transfer 13 of H.273");
+    assert_eq!(of(Some(adobe_rgb()), [12, 13, 0, 1]), "primaries 12, transfer 13 of H.273");
+    assert_eq!(of(Some(display_p3()), [1, 13, 0, 1]), "sRGB");
+    for unknown in [[2, 2, 0, 1], [200, 13, 0, 1]] {
+        assert_eq!(of(Some(display_p3()), unknown), "Display P3", "{unknown:?}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::io::{BufWriter, Seek, Write};
 
 use png::text_metadata::ITXtChunk;
 use png::{
-    BitDepth, ColorType, Compression, Decoder, DecodingError, Encoder, EncodingError, Info, Limits,
+    BitDepth, CodingIndependentCodePoints, ColorType, Compression, Decoder, DecodingError, Encoder, EncodingError, Info, Limits,
     SrgbRenderingIntent, Transformations,
 };
 use trueup_core::raster::{Photograph, RowSource};
@@ -12,6 +12,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 
 use super::decoded::{HEADER_BYTES, check_unchanged, damaged, decoding_limit, eight, sample_count, sixteen};
+use crate::color::{NamedSpace, space_of_code_points};
 use crate::encode::failure::WriteFailure;
 use crate::encode::metadata::Metadata;
 use crate::encode::options::{Depth, OutputOptions, PngCompression};
@@ -86,15 +87,33 @@ fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
     Ok(StoredPixels { width: width as usize, height: height as usize, bits, is_float: false })
 }
 
+/// What the code points of the chunk cICP say.
+fn named_space(info: &Info<'_>) -> NamedSpace {
+    let space = |points: CodingIndependentCodePoints| {
+        space_of_code_points(points.color_primaries.into(), points.transfer_function.into())
+    };
+    info.coding_independent_code_points.map_or(NamedSpace::Unknown, space)
+}
+
+/// The profile; code points that say something count before one that is embedded.
+///
+/// # Source
+/// W3C PNG (third edition), 4.3.
 fn icc(input: &mut Input) -> Option<Vec<u8>> {
-    decoder(input, HEADER_BYTES, true).ok()?.info().icc_profile.as_ref().map(|icc| icc.to_vec())
+    let reader = decoder(input, HEADER_BYTES, true).ok()?;
+    match named_space(reader.info()) {
+        NamedSpace::Srgb => None,
+        NamedSpace::Other(icc) => Some(icc),
+        NamedSpace::Unknown => reader.info().icc_profile.as_ref().map(|icc| icc.to_vec()),
+    }
 }
 
 /// EXIF is not asked for colors where the picture says itself that they are sRGB's.
 fn exif(input: &mut Input) -> Option<ExifFields> {
     let fields = embedded::read_exif(input)?;
     input.rewind().ok()?;
-    let says_srgb = header(input).is_ok_and(|reader| reader.info().srgb.is_some());
+    let is_srgb = |info: &Info<'_>| info.srgb.is_some() || named_space(info) == NamedSpace::Srgb;
+    let says_srgb = header(input).is_ok_and(|reader| is_srgb(reader.info()));
     Some(if says_srgb { fields.without_color_space() } else { fields })
 }
 
