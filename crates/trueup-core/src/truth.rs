@@ -159,11 +159,6 @@ impl ImageTruth {
 }
 
 impl Truth {
-    /// The truth of the photograph stored as `file` (a name without folders).
-    pub fn of_file(&self, file: &str) -> Option<&ImageTruth> {
-        self.images.iter().find(|image| image.file == file)
-    }
-
     /// Checks what a file may get wrong: sizes, focal lengths, angles, rotations that are none, names given twice.
     ///
     /// # Errors

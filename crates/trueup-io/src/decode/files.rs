@@ -132,13 +132,6 @@ impl FilePhotographs {
         decoding_surplus(&self.sources).saturating_add(self.sources.iter().map(fusing).max().unwrap_or(0))
     }
 
-    /// The same, which keeps at most so many bytes of decoded pixels.
-    #[must_use]
-    pub fn keeping(self, cache_bytes: usize) -> Self {
-        let kept = self.kept.into_inner().unwrap_or_else(PoisonError::into_inner);
-        Self { kept: Mutex::new(Kept { free_bytes: cache_bytes, ..kept }), ..self }
-    }
-
     /// The color space that photographs are handed out in, if it was asked for.
     pub fn colors(&self) -> Option<&PhotographColors> {
         self.colors.as_ref()
