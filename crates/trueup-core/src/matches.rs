@@ -99,9 +99,10 @@ pub struct PairMatches {
     pub b: usize,
     /// Number of putative matches (after ratio and mutual tests).
     pub putative: usize,
-    /// Putative matches that lie inside the overlap the homography predicts; 0 without a homography.
+    /// Putative matches that lie inside the overlap that the homography or the turned lens predicts; 0 without either.
     pub in_overlap: usize,
-    /// Those that agree with the global homography (n_i of the Brown-Lowe test).
+    /// Those of them that agree with the global homography or the turned lens (n_i of the Brown-Lowe test); where these alone are too
+    /// few to join the pair, also those on further planes and elsewhere in depth.
     pub agreeing: usize,
     /// How many had to agree for the pair to be joined.
     pub needed: usize,
@@ -117,7 +118,7 @@ pub struct PairMatches {
 }
 
 impl PairMatches {
-    /// Brown-Lowe confidence n_i / (8 + 0.3 n_f): above 1 the pair would be joined.
+    /// How many matches agree for each that had to, of which Brown and Lowe want 8 + 0.3 n_f: from 1 on the pair is joined.
     pub fn confidence(&self) -> f64 {
         if self.needed == 0 { 0.0 } else { self.agreeing as f64 / self.needed as f64 }
     }

@@ -100,7 +100,8 @@ pub struct StrangersInput<'a> {
 
 /// The pictures that the pairs show to be none of the scene's photographs, ascending by number.
 ///
-/// Overlaps of lenses that bend are not looked at: they have no homography. Edited copies are left where nothing else would overlap.
+/// Overlaps are looked at by their homographies, of lenses that bend by the one that says nearly the same of their matches. Edited copies are
+/// left where nothing else would overlap.
 pub fn find_strangers(input: &StrangersInput) -> Vec<Stranger> {
     let StrangersInput { frames, pairs, .. } = *input;
     let views: Vec<SharedView> = pairs.iter().filter_map(|pair| SharedView::of(pair, input)).collect();
