@@ -4,8 +4,8 @@ use std::io::{BufWriter, Seek, Write};
 
 use png::text_metadata::ITXtChunk;
 use png::{
-    BitDepth, CodingIndependentCodePoints, ColorType, Compression, Decoder, DecodingError, Encoder, EncodingError, Info, Limits,
-    SrgbRenderingIntent, Transformations,
+    BitDepth, CodingIndependentCodePoints, ColorType, Compression, Decoder, DecodingError, Encoder, EncodingError,
+    Info, Limits, SrgbRenderingIntent, Transformations,
 };
 use trueup_core::raster::{Photograph, RowSource};
 use trueup_core::source::SourceImage;

@@ -18,11 +18,7 @@ pub(super) fn decoder(input: &mut dyn TiffInput) -> TiffResult<TiffDecoder<'_>> 
 }
 
 /// A decoder that takes no more memory than the photograph needs, whose first page is `page`.
-pub(super) fn open<'a>(
-    source: &SourceImage,
-    page: FirstPage,
-    input: &'a mut dyn TiffInput,
-) -> Result<TiffDecoder<'a>> {
+pub(super) fn open<'a>(source: &SourceImage, page: FirstPage, input: &'a mut dyn TiffInput) -> Result<TiffDecoder<'a>> {
     let bytes = usize::try_from(limit(source, page)).unwrap_or(usize::MAX);
     let mut limits = Limits::default();
     limits.decoding_buffer_size = bytes;
