@@ -93,8 +93,10 @@ pub(super) fn place(
             .unwrap_or(input.reference);
         return Err(refuse(model, input, widest, "cannot be laid on one plane with the others"));
     };
-    let mesh =
-        |photograph: usize| deformed(&input.grids[photograph], |point| warp.place(&planes.routes[photograph], point));
+    let mesh = |photograph: usize| {
+        let place = |point| warp.place(&planes.routes[photograph], input.straight(photograph, point));
+        deformed(&input.grids[photograph], place)
+    };
     Ok((0..input.grids.len()).map(mesh).collect())
 }
 

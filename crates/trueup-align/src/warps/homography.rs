@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector2};
 use trueup_core::camera::Camera;
 use trueup_core::geometry::Homography;
+use trueup_core::matches::PointMatch;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result};
 
@@ -26,7 +27,11 @@ pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions) -> Result<Vec<
     if let Some(photograph) = widest {
         return Err(refuse(WarpModel::Homography, input, photograph, "does not lie in front of the panorama's plane"));
     }
-    Ok(homographies.iter().zip(input.grids).map(|(h, grid)| deformed(grid, |point| h.apply(point))).collect())
+    let mesh = |photograph: usize| {
+        let onto_plane = |point| homographies[photograph].apply(input.straight(photograph, point));
+        deformed(&input.grids[photograph], onto_plane)
+    };
+    Ok((0..homographies.len()).map(mesh).collect())
 }
 
 /// For every photograph the homography onto the plane of photograph `target`, its denominator the depth.
@@ -71,16 +76,21 @@ fn chained(input: &WarpInput<'_>, target: usize) -> Result<Vec<Homography>> {
         .collect()
 }
 
-/// The homography from photograph `from` to photograph `to` by their matches, its denominator the depth.
+/// The homography from photograph `from` to photograph `to` by their matches, its denominator the depth; of what pinholes would show, where a
+/// lens bends.
 fn of_pair(input: &WarpInput<'_>, from: usize, to: usize) -> Result<Homography> {
     let pair = input.pairs.iter().find(|pair| (pair.a, pair.b) == (from.min(to), from.max(to)));
-    let b_from_a = pair.and_then(|pair| match &pair.b_from_a {
-        Some(rows) => Some(Homography::from_rows(rows)),
+    let are_pinholes = [from, to].iter().all(|&one| input.cameras[one].lens.is_pinhole());
+    let b_from_a = pair.and_then(|pair| match pair.b_from_a.filter(|_| are_pinholes) {
+        Some(rows) => Some(Homography::from_rows(&rows)),
         None => {
-            let points = |of: fn(&trueup_core::matches::PointMatch) -> [f64; 2]| -> Vec<Vector2<f64>> {
-                pair.inliers.iter().map(|one| Vector2::from(of(one))).collect()
+            let ends = |one: &PointMatch| {
+                [(pair.a, one.in_a), (pair.b, one.in_b)].map(|(k, end)| input.straight(k, end.into()))
             };
-            Homography::fit(&points(|one| one.in_a), &points(|one| one.in_b), None)
+            let is_seen = |ends: &[Vector2<f64>; 2]| ends.iter().flatten().all(|value| value.is_finite());
+            let (in_a, in_b): (Vec<_>, Vec<_>) =
+                pair.inliers.iter().map(ends).filter(is_seen).map(<(_, _)>::from).unzip();
+            Homography::fit(&in_a, &in_b, None)
         }
     });
     let directed = if from < to { b_from_a } else { b_from_a.and_then(|homography| homography.inverse()) };

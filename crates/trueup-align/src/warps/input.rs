@@ -1,6 +1,6 @@
 //! What warp models are made from.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector2};
 use trueup_core::camera::Camera;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
@@ -46,6 +46,20 @@ pub struct WarpInput<'a> {
 }
 
 impl WarpInput<'_> {
+    /// Where a pinhole of the camera's focal length and principal point shows what its photograph shows at `pixel`: what homographies are of.
+    /// Not finite for what no pinhole sees.
+    pub(super) fn straight(&self, photograph: usize, pixel: Vector2<f64>) -> Vector2<f64> {
+        let camera = &self.cameras[photograph];
+        if camera.lens.is_pinhole() {
+            return pixel;
+        }
+        let bearing = camera.bearing(pixel);
+        match bearing.z > 0.0 {
+            true => bearing.xy() / bearing.z * camera.focal_px + Vector2::from(camera.principal_point),
+            false => Vector2::repeat(f64::NAN),
+        }
+    }
+
     /// Refuses lists that do not fit each other.
     pub(super) fn check(&self) -> Result<()> {
         let count = self.grids.len();

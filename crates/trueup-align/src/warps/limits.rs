@@ -76,15 +76,17 @@ pub(super) fn with_depth(homography: &Homography, focal_from: f64, focal_to: f64
 /// `homography` as of [`with_depth`]. Where no corner is behind the plane, no point of the photograph is.
 pub(super) fn least_depth(homography: &Homography, input: &WarpInput<'_>, photograph: usize) -> f64 {
     let (frame, camera) = (&input.frames[photograph], &input.cameras[photograph]);
-    corners(frame.width, frame.height)
-        .into_iter()
-        .map(|corner| depth_at(homography, camera, corner))
-        .fold(f64::INFINITY, f64::min)
+    let depth = |corner: Vector2<f64>| depth_at(homography, camera, input.straight(photograph, corner));
+    // What no pinhole sees lies behind every plane; `f64::min` would pass over it.
+    let depths = corners(frame.width, frame.height).into_iter().map(depth);
+    depths.map(|depth| if depth.is_nan() { f64::NEG_INFINITY } else { depth }).fold(f64::INFINITY, f64::min)
 }
 
-/// The depth of a point relative to its distance along the viewing direction; `homography` as of [`with_depth`].
+/// The depth of a point relative to its distance along the viewing direction; `homography` as of [`with_depth`], the point as of
+/// [`WarpInput::straight`].
 pub(super) fn depth_at(homography: &Homography, camera: &Camera, point: Vector2<f64>) -> f64 {
-    homography.denominator(point) / camera.bearing(point).norm()
+    let aside = (point - Vector2::from(camera.principal_point)) / camera.focal_px;
+    homography.denominator(point) / aside.push(1.0).norm()
 }
 
 /// Refuses a homography that carries a point of an overlap behind its neighbor's plane.

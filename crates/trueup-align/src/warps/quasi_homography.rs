@@ -119,12 +119,14 @@ pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &Stag
     (0..count)
         .map(|photograph| {
             let chain = chains[photograph].as_ref().ok_or_else(|| undetermined(input, photograph))?;
-            Ok(deformed(&input.grids[photograph], |point| chain.iter().fold(point, |place, warp| warp.apply(place))))
+            let straight = |point| input.straight(photograph, point);
+            let place = |point| chain.iter().fold(straight(point), |place, warp| warp.apply(place));
+            Ok(deformed(&input.grids[photograph], place))
         })
         .collect()
 }
 
-/// The vertices of a photograph that a homography carries into another, and its matches with that one.
+/// The vertices of a photograph that a homography carries into another, and its matches with that one, as of [`WarpInput::straight`].
 fn overlap(input: &WarpInput<'_>, photograph: usize, parent: usize, homography: &Homography) -> Vec<Vector2<f64>> {
     let (grid, frame) = (&input.grids[photograph], &input.frames[parent]);
     let inside = |point: &Vector2<f64>| {
@@ -134,7 +136,9 @@ fn overlap(input: &WarpInput<'_>, photograph: usize, parent: usize, homography: 
     let pair = input.pairs.iter().find(|pair| (pair.a, pair.b) == (photograph.min(parent), photograph.max(parent)));
     let matches = pair.into_iter().flat_map(|pair| &pair.inliers);
     let matched = matches.map(|one| Vector2::from(if photograph < parent { one.in_a } else { one.in_b }));
-    (0..grid.len()).map(|vertex| grid.source(vertex)).filter(inside).chain(matched).collect()
+    let straight = |point: Vector2<f64>| input.straight(photograph, point);
+    let vertices = (0..grid.len()).map(|vertex| straight(grid.source(vertex))).filter(inside);
+    vertices.chain(matched.map(straight)).collect()
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use nalgebra::Matrix3;
 use trueup_core::Error;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_y;
+use trueup_core::lens::{LensTerms, PlacedLens};
 use trueup_core::matches::{PairMatches, PairVerdict, PointMatch, PointMatches};
 use trueup_core::source::WorkingFrame;
 
@@ -154,6 +155,26 @@ fn homographies_meet_and_leave_the_reference_in_place() {
         let center = placed.meshes[2].warp(Vector2::new(WIDTH / 2.0, HEIGHT / 2.0));
         let expected = WIDTH / 2.0 + FOCAL_PX * 25_f64.to_radians().tan();
         assert!((center.x - expected).abs() < 0.1 && (center.y - HEIGHT / 2.0).abs() < 0.1, "{center}");
+    }
+}
+
+/// A barrel of -4 % at the corners: what meets are the places where pinholes would show the matches.
+#[test]
+fn homographies_behind_a_lens_meet() {
+    let terms = LensTerms { radial: [-0.1, 0.0, 0.0, 0.0], ..LensTerms::default() };
+    let lens = PlacedLens { terms, center_px: [0.0; 2] };
+    let pinholes = Example::panned(&[0.0, 20.0, 40.0], 1).cameras;
+    let bent = Example::new(pinholes.into_iter().map(|camera| camera.through(&lens)).collect(), 1);
+    for model in [WarpModel::Homography, WarpModel::Sphp, WarpModel::SphpFree, WarpModel::QuasiHomography] {
+        let placed = bent.place(model).expect("narrow enough");
+        let apart = |pair: &PairMatches| {
+            let meshes = [&placed.meshes[pair.a], &placed.meshes[pair.b]];
+            let of_match =
+                move |one: &PointMatch| (meshes[0].warp(one.in_a.into()) - meshes[1].warp(one.in_b.into())).norm();
+            pair.inliers.iter().map(of_match).fold(0.0, f64::max)
+        };
+        let farthest = bent.pairs.iter().map(apart).fold(0.0, f64::max);
+        assert!(farthest < 0.5, "{model:?}: {farthest}");
     }
 }
 
