@@ -248,6 +248,21 @@ mod tests {
         }
     }
 
+    /// Of 400 x 300 px in cells of about 40, with an even and an odd number of them: turned more and more to the right, by nothing in the middle.
+    #[test]
+    fn the_middle_is_in_the_middle_however_many_cells_there_are() {
+        for cells in [(10, 7), (9, 8), (9, 7), (10, 8)] {
+            let mut mesh = GridMesh::regular(40.0 * f64::from(cells.0), 40.0 * f64::from(cells.1), 40.0);
+            let middle = Vector2::new(mesh.width, mesh.height) / 2.0;
+            let fanned = |source: Vector2<f64>| {
+                let (aside, below) = ((source.x - middle.x) / 500.0, source.y - middle.y);
+                [source.x + aside * below, source.y]
+            };
+            mesh.target = (0..mesh.len()).map(|vertex| fanned(mesh.source(vertex))).collect();
+            assert!(mesh.lean_in_the_middle(0.0).abs() < 1e-12, "{cells:?}: {}", mesh.lean_in_the_middle(0.0));
+        }
+    }
+
     /// Near a pole of an equirectangular panorama, rows are drawn longer than columns: a rolled photograph whose verticals stand
     /// upright there has columns that lean by more than its roll.
     #[test]

@@ -180,10 +180,10 @@ pub(super) fn find(
     }
     let tilted = search.tilted()?;
     let tilted = tilted.map(|cameras| (of_plane(&cameras), cameras));
-    if let Some((plane, cameras)) = scans {
-        if tilted.as_ref().is_none_or(|(tilted, _)| plane.rms_px <= AS_GOOD * tilted.rms_px) {
-            return Ok(Some(FlatScene { cameras, evidence: evidence(&plane, true), turned_by_lines: None }));
-        }
+    let as_good_as_tilted =
+        |plane: &Residuals| tilted.as_ref().is_none_or(|(tilted, _)| plane.rms_px <= AS_GOOD * tilted.rms_px);
+    if let Some((plane, cameras)) = scans.filter(|(plane, _)| as_good_as_tilted(plane)) {
+        return Ok(Some(FlatScene { cameras, evidence: evidence(&plane, true), turned_by_lines: None }));
     }
     let Some((plane, cameras)) = tilted else {
         return refused(told, "no cameras before a plane explain the matches");

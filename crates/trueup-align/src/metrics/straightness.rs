@@ -78,7 +78,7 @@ fn place_along(line: &LineSegment, camera: &Camera, share: f64) -> Option<Vector
 #[cfg(test)]
 mod tests {
     use nalgebra::Matrix3;
-    use trueup_core::lens::{Lens, LensTerms, PlacedLens};
+    use trueup_core::lens::{LensTerms, PlacedLens};
 
     use super::*;
 

@@ -143,6 +143,21 @@ fn a_wide_row_that_looks_up_is_drawn_level() {
     assert!(between.is_sorted_by(|wider, narrower| wider >= narrower), "{between:?}");
 }
 
+/// A facade 6 degrees aside is faced by photographs that are drawn level, and less and less the more they are looked at.
+#[test]
+fn the_viewer_turns_aside_as_the_pitch_does() {
+    let dominant = rotation_about_y(6_f64.to_radians());
+    let looking = |pitch_deg: f64| {
+        let options = ProjectionOptions::default();
+        let view = ProjectionView::choose(&[photograph(0.0, pitch_deg)], Some(&dominant), &options);
+        [view.yaw.to_degrees(), view.pitch.to_degrees()]
+    };
+    let steps: Vec<[f64; 2]> = (30..=55).map(|pitch| looking(f64::from(pitch))).collect();
+    let apart = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).abs();
+    let farthest = steps.windows(2).map(apart).fold(0.0, f64::max);
+    assert!(steps[0][0] > 2.0 && steps[25][0].abs() < 0.5 && farthest < 1.5, "{steps:?}");
+}
+
 /// Rings at 20, 50 and 75 degrees down, and straight down, as drones take them: a sphere. Without the first, what is below.
 #[test]
 fn a_drone_looks_round_and_down() {
