@@ -70,7 +70,7 @@ impl Gaps {
         let radius = fill * layout.photograph_side();
         let cell = (1..).find(|cell| width.div_ceil(*cell) * height.div_ceil(*cell) <= MOST_CELLS).unwrap_or(1);
         // The casts saturate; no gap is wider than the canvas.
-        let reach = ((2.0 * radius / cell as f64).ceil() as usize + 1).min(width.max(height));
+        let reach = ((2.0 * radius / cell as f64).ceil() as usize + 1).min(width.max(height).div_ceil(cell));
         // Discs whose middles lie beyond an end of a full turn reach back over it.
         let lead = if layout.period.is_some() { reach.min(width / cell) } else { 0 };
         let (columns, rows) = (width.div_ceil(cell) + 2 * lead, height.div_ceil(cell));

@@ -12,7 +12,7 @@
 //! * [`crop`]: what of the finished panorama is kept;
 //! * [`fidelity`]: how true a panorama is to its photographs.
 //!
-//! A photograph's samples are resampled exactly once, straight to the canvas.
+//! A photograph's samples are resampled once, straight to the canvas; one that is drawn smaller is reduced before.
 
 pub mod crop;
 pub mod exposure;

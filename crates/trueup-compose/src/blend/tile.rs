@@ -157,7 +157,7 @@ impl BlendTile {
         Some(plane)
     }
 
-    /// Every pixel from the photograph that the seams give it to.
+    /// Every pixel from the photograph that the seams give it to, as opaque as all that show it make it together.
     fn cut(
         &self,
         out: &mut [&mut [RootPixel]],
@@ -167,6 +167,7 @@ impl BlendTile {
     ) {
         let width = self.columns.len();
         let mut taken = vec![0.0_f32; width * self.rows.len()];
+        let mut opacity = vec![0.0_f32; taken.len()];
         let mut labels = Vec::new();
         for (label, photograph) in shown {
             let mut pixels = vec![[0.0; 4]; taken.len()];
@@ -177,11 +178,17 @@ impl BlendTile {
                     let at = row * width + x;
                     // Where the owner covers nothing, whoever covers most.
                     let claim = pixels[at][3] * if *own == work.shown.label(*label) { 2.0 } else { 1.0 };
+                    opacity[at] += pixels[at][3];
                     if claim > taken[at] {
                         taken[at] = claim;
                         out[row][x] = finished(pixels[at]);
                     }
                 }
+            }
+        }
+        for (pixel, opacity) in out.iter_mut().flat_map(|row| row.iter_mut()).zip(opacity) {
+            if opacity > 0.0 {
+                pixel[3] = finished_sample(opacity);
             }
         }
     }

@@ -140,10 +140,12 @@ impl Corrections {
             return (self, false);
         };
         let [low, high] = [largest.recip(), largest].map(|limit| limit * median.exp());
-        let is_beyond = |gain: &f64| *gain < low || *gain > high;
-        let limited = members().any(|(correction, _)| correction.gain.iter().any(is_beyond));
+        let limited = members().any(|(correction, _)| !(low..=high).contains(&correction.brightness()));
         for (correction, _) in self.photographs.iter_mut().zip(compared).filter(|(_, compared)| **compared) {
-            correction.gain = correction.gain.map(|gain| gain.clamp(low, high));
+            // All channels alike: the color is right however bright it may be made.
+            let brightness = correction.brightness();
+            let factor = brightness.clamp(low, high) / brightness;
+            correction.gain = correction.gain.map(|gain| gain * factor);
         }
         (self, limited)
     }
@@ -175,6 +177,21 @@ mod tests {
         for (correction, gain) in at_level.photographs.iter().zip([0.25, 5.0, 1.0]) {
             assert!((correction.brightness() / gain - 1.0).abs() < 1e-12, "{at_level:?}");
         }
+    }
+
+    /// White balance stays what it is where brightness is limited.
+    #[test]
+    fn a_limited_photograph_keeps_its_color() {
+        let warm = Correction { gain: [6.0, 4.0, 3.0], ..Correction::uniform(1.0) };
+        let all: Corrections = vec![Correction::uniform(1.0), Correction::uniform(1.0), warm].into();
+        let (limited, is_limited) = all.limited(&[true; 3], 2.0);
+        let [red, green, blue] = limited.photographs[2].gain;
+        assert!(is_limited && (limited.photographs[2].brightness() - 2.0).abs() < 1e-9, "{limited:?}");
+        assert!((red / green - 1.5).abs() < 1e-9 && (green / blue - 4.0 / 3.0).abs() < 1e-9, "{limited:?}");
+        // A channel beyond the limit alone is none.
+        let tinted = Correction { gain: [2.5, 1.0, 1.0], ..Correction::uniform(1.0) };
+        let all: Corrections = vec![Correction::uniform(1.0), Correction::uniform(1.0), tinted].into();
+        assert_eq!(all.clone().limited(&[true; 3], 2.0), (all, false));
     }
 
     /// A turn in sun and shade: two in the sun, a hundredth of the light of those in the shade, which a level in the sun brought to the limit before.

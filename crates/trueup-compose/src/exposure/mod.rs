@@ -65,7 +65,9 @@ pub fn run(input: &ExposureInput<'_>, options: &ExposureOptions, context: &Stage
     let [width, height] = [layout.width, layout.height].map(|length| (length as f64 * scale).ceil() as usize);
     let size = [turn.unwrap_or(width), height];
     // Samples of a turn lie on the photographs, not on the canvas: the same wherever it is cut open.
-    let anchor = layout.period.and_then(|_| layout.placed.first()?.mesh.target.first().map(|vertex| vertex[0]));
+    let is_placed = |vertex: &&[f64; 2]| vertex.iter().all(|coordinate| coordinate.is_finite());
+    let anchor =
+        layout.period.and_then(|_| layout.placed.first()?.mesh.target.iter().find(is_placed).map(|place| place[0]));
     let patches: Vec<Patch> = layout
         .placed
         .par_iter()

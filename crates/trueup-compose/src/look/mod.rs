@@ -101,7 +101,7 @@ const LEAST_STOPS: f64 = 5e-3;
 /// Cells of the field along the shorter side of a photograph: a transition is some thirty of them wide.
 const CELLS_PER_SIDE: f64 = 48.0;
 
-/// Most cells of a field, 32 MB while it is made. A thousand photographs have fewer.
+/// Most cells of a field, 190 MB while it is made. A thousand photographs have fewer.
 const MOST_CELLS: f64 = 2e6;
 
 /// Standard deviation of the smoothing as a share of the photographs' shorter side: where overlaps are narrow, the change

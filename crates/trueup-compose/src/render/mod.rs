@@ -1,8 +1,8 @@
 //! Warp, correct and compose: the full-resolution photographs onto the canvas.
 //!
 //! With seams (the default), photographs are made small, seams are found between the small views, and the canvas is
-//! finished in tiles along them; see [`Blend`]. Without, photographs are decoded as many at a time as the current thread
-//! pool has threads, then added to the canvas one after the other, each in parallel over bands of rows. Both give the same
+//! finished in tiles along them; see [`Blend`]. Without, photographs are decoded as many at a time as memory and threads
+//! allow, then added to the canvas one after the other, each in parallel over bands of rows. Both give the same
 //! bits for any number of threads.
 
 mod average;

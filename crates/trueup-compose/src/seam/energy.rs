@@ -53,7 +53,7 @@ pub(super) struct SeamEnergy<'a> {
     softness: &'a [Softness],
     /// How often the canvas that the softness is of was halved.
     halvings: u32,
-    /// For every canvas pixel: bit flags of what all photographs say of it, see [`Self::has_whole`].
+    /// For every canvas pixel: bit flags of what all photographs say of it.
     anyone: Vec<u8>,
     /// Number of the moving thing that covers a canvas pixel; 0 for none.
     pub(super) moving: &'a [u32],
