@@ -30,6 +30,8 @@ pub(crate) fn run(args: &EvaluateArgs) -> std::result::Result<(), Failure> {
     };
     if args.json {
         let whole = json!({
+            "format": "trueup-evaluation",
+            "version": 1,
             "project": args.project.display().to_string(),
             "measures": project.measures.as_ref().map(Measures::without_places),
             "truth": evaluation,

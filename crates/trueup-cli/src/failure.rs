@@ -36,7 +36,7 @@ impl Failure {
 
     /// Options that cannot be, all of them.
     pub(crate) fn options(mut wrong: Vec<String>) -> Self {
-        let hint = "List the options with their ranges with `trueup options`.";
+        let hint = "List all options with their ranges with `trueup options --expert`.";
         match wrong.len() {
             1 => Self::usage(wrong.remove(0), hint),
             count => Self { details: wrong, ..Self::usage(format!("{count} options cannot be used:"), hint) },
@@ -62,7 +62,9 @@ impl From<Error> for Failure {
             Error::Unsupported { what, hint } => Self::usage(format!("{what} is not supported"), hint),
             Error::Unsolvable { stage, subject, why, hint } => failed(format!("{stage}: {subject}: {why}"), hint),
             Error::NotApplicable { method, reason, hint } => {
-                failed(format!("the method {method} is not applicable: {reason}"), hint)
+                // An option as it is set says by itself what it is.
+                let what = if method.contains('=') { method } else { format!("the method {method}") };
+                failed(format!("{what} is not applicable: {reason}"), hint)
             }
             Error::Cancelled => Self { status: status_of_stopping(), ..failed(error.to_string(), String::new()) },
             other => failed(other.to_string(), String::new()),

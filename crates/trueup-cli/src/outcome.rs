@@ -26,15 +26,25 @@ pub(crate) fn tell(written: &[Written], messages: &MessageArgs, takes_output: bo
 
 fn refuse(written: &[Written], messages: &MessageArgs) -> Result<(), Failure> {
     let apart = |one: &Written| Some(one.project.measures.as_ref()?.reprojection.as_ref()?.percentile_95_px);
+    if messages.max_error.is_some() && written.iter().any(|one| apart(one).is_none()) {
+        return Err(Failure::unsatisfied(
+            "how far apart matched points land was not measured, so that --max-error cannot tell",
+            "The panorama is written. Stitch the photographs with this view, or leave --max-error out.",
+        ));
+    }
     let widest = written.iter().filter_map(apart).fold(0.0, f64::max);
     if let Some(allowed) = messages.max_error.filter(|&allowed| widest > allowed) {
         return Err(Failure::unsatisfied(
-            format!("95 of 100 matched points land within {widest:.1} px, {allowed} px are allowed (--max-error)"),
-            "Look at the panorama, which is written. Leave out the photographs that its warning names, or allow more.",
+            format!("95 of 100 matched points land within {widest:.3} px, {allowed} px are allowed (--max-error)"),
+            "Look at the panorama, which is written. Leave out the photographs that meet worst (`trueup evaluate` names them), or allow more.",
         ));
     }
-    let warnings = written.iter().flat_map(|one| one.project.warnings());
-    let warnings: Vec<&str> = warnings.map(|one| one.message.as_str()).collect();
+    let of_panorama = |one: &Written| -> Vec<String> {
+        let names = one.project.photograph_names();
+        let warnings = one.project.warnings();
+        warnings.map(|warning| format!("{}: {}", warning.subject.named(&names), warning.message)).collect()
+    };
+    let warnings: Vec<String> = written.iter().flat_map(of_panorama).collect();
     match (messages.fail_on, warnings.as_slice()) {
         (None, _) | (_, []) => Ok(()),
         (Some(FailOn::Warning), [first, others @ ..]) => {

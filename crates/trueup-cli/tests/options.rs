@@ -116,7 +116,7 @@ fn wrong_options_are_all_listed_with_what_is_allowed() {
             "--set mesh.cell=3: there is no option \"mesh.cell\"",
             "--set mash.cell_px=3: there is no option \"mash.cell_px\"",
             "--set mesh.cell_px: there is no \"=\" in it",
-            "trueup: hint: List the options with their ranges with `trueup options`.",
+            "trueup: hint: List all options with their ranges with `trueup options --expert`.",
         ],
     );
 }

@@ -69,7 +69,11 @@ fn warnings_and_errors_of_alignment_can_be_failures() {
     desk.put("text.jpg", "Dear diary");
     let warned = desk.stitch(&["a.jpg", "b.jpg", "text.jpg", "--fail-on", "warning"]);
     assert_eq!(warned.status, 3, "{}", warned.stderr);
-    assert!(warned.stderr.contains("a warning is a failure here (--fail-on): its content is not"), "{}", warned.stderr);
+    assert!(
+        warned.stderr.contains("a warning is a failure here (--fail-on): text.jpg: its content is not"),
+        "{}",
+        warned.stderr
+    );
     assert!(warned.stdout.contains("photographs 2 of 3 used") && desk.join("pano.jpg").exists());
     let apart = desk.stitch(&["a.jpg", "b.jpg", "--max-error", "0.001"]);
     assert_eq!(apart.status, 3, "{}", apart.stderr);

@@ -62,7 +62,8 @@ impl From<Error> for Trouble {
             Error::Unsupported { what, hint } => trouble(format!("{what} is not supported"), hint),
             Error::Unsolvable { subject, why, hint, .. } => trouble(format!("{subject}: {why}"), hint),
             Error::NotApplicable { method, reason, hint } => {
-                trouble(format!("the method {method} cannot be used here: {reason}"), hint)
+                let what = if method.contains('=') { method } else { format!("the method {method}") };
+                trouble(format!("{what} cannot be used here: {reason}"), hint)
             }
             other => trouble(other.to_string(), String::new()),
         }

@@ -23,8 +23,8 @@ The same command goes on where it was stopped or killed, and may run several tim
 the folders: a set is made by one of them. A set that cannot be stitched is recorded with its reason, and is tried again when its \
 photographs or the options change, or with --retry.
 
-Exit status: 0 every set made a panorama, 1 the input or the system failed, 2 wrong usage, 3 some sets made none, 130 stopped by \
-Ctrl-C, 143 by a request to terminate.";
+Exit status: 0 every set made a panorama or is a single photograph, 1 the input or the system failed, 2 wrong usage, 3 some sets \
+failed, 130 stopped by Ctrl-C, 143 by a request to terminate.";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]

@@ -76,11 +76,11 @@ pub(crate) struct CompareArgs {
     )]
     pub tally: Vec<PathBuf>,
 
-    /// With --tally: as a JSON object
-    #[arg(long, requires = "tally", help_heading = "Rankings")]
-    pub json: bool,
-
     /// Print nothing but errors
-    #[arg(short, long, help_heading = "Messages")]
+    #[arg(short, long, conflicts_with = "json", help_heading = "Messages")]
     pub quiet: bool,
+
+    /// Print a JSON object: what compare.json holds, or with --tally the scores
+    #[arg(long, help_heading = "Messages")]
+    pub json: bool,
 }

@@ -18,10 +18,21 @@ pub(crate) fn run(args: CompareArgs) -> Result<(), Failure> {
     if !args.tally.is_empty() {
         return sum_up(&args);
     }
-    let quiet = args.quiet;
+    let (quiet, json) = (args.quiet, args.json);
     let (job, options) = checked(args)?;
     let compared = progress::shown(quiet, |context| job.run(&options, context, &pages))?;
-    if quiet { Ok(()) } else { output::print(&summary::text(&compared, &job.output)) }
+    match (quiet, json) {
+        (true, _) => Ok(()),
+        (false, true) => print_json("comparison", &compared),
+        (false, false) => output::print(&summary::text(&compared, &job.output)),
+    }
+}
+
+/// Prints `what` as JSON.
+fn print_json(what: &str, value: &impl serde::Serialize) -> Result<(), Failure> {
+    let json =
+        serde_json::to_string_pretty(value).map_err(|error| Error::input(what, error, "Report this as a defect."))?;
+    output::print(&format!("{json}\n"))
 }
 
 /// The pages of a comparison.
@@ -38,14 +49,7 @@ fn pages(comparison: &Comparison, drawings: &[Drawing]) -> Result<Vec<Comparison
 fn sum_up(args: &CompareArgs) -> Result<(), Failure> {
     let results = args.tally.iter().map(|path| read_rankings(path)).collect::<Result<Vec<_>, _>>()?;
     let tally = tally(&results)?;
-    match args.json {
-        true => {
-            let json = serde_json::to_string_pretty(&tally)
-                .map_err(|error| Error::input("tally", error, "Report this as a defect."))?;
-            output::print(&format!("{json}\n"))
-        }
-        false => output::print(&summary::scores(&tally)),
-    }
+    if args.json { print_json("tally", &tally) } else { output::print(&summary::scores(&tally)) }
 }
 
 /// Arguments that make sense: what the library needs.

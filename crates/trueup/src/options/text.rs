@@ -42,7 +42,9 @@ impl StitchOptions {
                 }
             }
         }
-        *self = merged.try_into().map_err(|error| Error::input(file, first_line(&error), hint))?;
+        // The last line of a wrong type's error names the option.
+        let wrong = |error: toml::de::Error| Error::input(file, error.to_string().trim_end().replace('\n', " "), hint);
+        *self = merged.try_into().map_err(wrong)?;
         Ok(())
     }
 

@@ -207,7 +207,7 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, memo: Memo, context: &StageC
                 ),
                 false => (
                     "no cameras are known: there is one photograph alone, or its record lacks them",
-                    "Stitch at least two overlapping photographs, or leave the projection to mesh.",
+                    "Stitch at least two overlapping photographs, or leave out --projection.",
                 ),
             };
             let option = format!("projection.kind = {}", trueup_core::options::OptionValue::display(&wanted));
