@@ -80,6 +80,10 @@ fn warnings_and_errors_of_alignment_can_be_failures() {
     assert!(apart.stderr.contains(" px, 0.001 px are allowed (--max-error)"), "{}", apart.stderr);
     let fine = desk.stitch(&["a.jpg", "b.jpg", "--max-error", "50", "--fail-on", "warning"]);
     assert!(fine.expect_success().contains("judged      "), "{}", fine.stdout);
+    // One photograph alone meets nothing.
+    let alone = desk.stitch(&["a.jpg", "--max-error", "50"]);
+    assert_eq!(alone.status, 3, "{}", alone.stderr);
+    assert!(alone.stderr.contains("was not measured, so that --max-error cannot tell"), "{}", alone.stderr);
     desk.stitch(&["a.jpg", "b.jpg", "--max-error", "-1"]).expect_failure(2, &["a number of pixels, 0 or more"]);
 }
 

@@ -98,6 +98,10 @@ fn overlaps_across_the_ends_of_a_full_turn_count() {
     }
     let alone = estimate_of(&flat, &thumbnails, &options).expect("estimates");
     assert!(alone.pairs.is_empty());
+    // A vertex that has no place, as one at a pole may not, is none that samples are counted from.
+    let mut torn = CanvasLayout { width: AROUND, period: Some(AROUND), ..layout(&[0.0, 300.0]) };
+    torn.placed[0].mesh.target[0] = [f64::NAN; 2];
+    assert_eq!(estimate_of(&torn, &thumbnails, &options).expect("estimates").pairs.len(), 1);
 }
 
 /// The same samples are compared wherever the turn is cut open, though the cuts lie between them.
