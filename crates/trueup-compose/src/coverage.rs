@@ -39,7 +39,7 @@ impl Rectangle {
     }
 }
 
-/// Which pixels of a canvas some photograph covers wholly.
+/// Which pixels of a canvas some photograph covers wholly. Of grids alone, it knows nothing of what is transparent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coverage {
     width: usize,
@@ -109,6 +109,22 @@ impl Coverage {
             united(stretches.iter().cloned().chain(more).collect())
         };
         Self { width: self.width, rows: self.rows.par_iter().enumerate().map(filled).collect() }
+    }
+
+    /// What of it lies in the stretches that `of_row` names for each row, disjoint ascending ones that do not touch.
+    ///
+    /// # Errors
+    /// Those of `of_row`.
+    pub(crate) fn within<E: Send>(
+        &self,
+        of_row: impl Fn(usize) -> Result<Vec<Range<usize>>, E> + Sync,
+    ) -> Result<Self, E> {
+        let part = |(y, stretches): (usize, &Vec<Range<usize>>)| match stretches.is_empty() {
+            true => Ok(Vec::new()),
+            false => Ok(intersection(stretches, &of_row(y)?)),
+        };
+        let rows = self.rows.par_iter().enumerate().map(part).collect::<Result<_, E>>()?;
+        Ok(Self { width: self.width, rows })
     }
 
     /// Number of pixels covered.

@@ -145,6 +145,11 @@ impl Photograph {
         }
     }
 
+    /// Whether it has an alpha channel, so that parts of it may be transparent.
+    pub fn has_alpha(&self) -> bool {
+        self.channels() == 4
+    }
+
     /// Samples per pixel: 1, 3 or 4.
     pub fn channels(&self) -> usize {
         match self {

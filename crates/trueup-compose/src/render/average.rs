@@ -44,8 +44,15 @@ pub(super) struct AverageInput<'a> {
     pub(super) plan: &'a MemoryPlan,
 }
 
+/// Photographs that were averaged.
+pub(super) struct Averaged {
+    pub(super) sums: PixelStore<SumPixel>,
+    /// Whether some photograph has an alpha channel.
+    pub(super) has_alpha: bool,
+}
+
 /// The weighted mean of all photographs at every pixel: sums over as many rows at once as there is memory for.
-pub(super) fn run(input: &AverageInput<'_>, context: &StageContext) -> Result<PixelStore<SumPixel>> {
+pub(super) fn run(input: &AverageInput<'_>, context: &StageContext) -> Result<Averaged> {
     let &AverageInput { photographs, plan, .. } = input;
     let (layout, originals) = input.layout.unrolled(0);
     let (width, height) = (layout.width, layout.height);
@@ -61,9 +68,10 @@ pub(super) fn run(input: &AverageInput<'_>, context: &StageContext) -> Result<Pi
         |part: &Range<usize>| -> Vec<usize> { (0..covered.len()).filter(|&at| meet(&covered[at], part)).collect() };
     let covering: Vec<Vec<usize>> = parts.iter().map(covering).collect();
     context.progress().begin(STAGE, covering.iter().map(Vec::len).sum::<usize>() as u64);
+    let mut has_alpha = false;
     let mut store = plan.on_disk().then(|| plan.store([width, height], [width, BAND_ROWS]));
     for (part, covering) in parts.into_iter().zip(covering) {
-        let sums = summing.sums(&part, &covering, context)?;
+        let sums = summing.sums(&part, &covering, &mut has_alpha, context)?;
         match &mut store {
             // All rows at once.
             None => store = Some(PixelStore::of_pixels(width, sums)),
@@ -83,7 +91,8 @@ pub(super) fn run(input: &AverageInput<'_>, context: &StageContext) -> Result<Pi
         }
     }
     context.progress().finish(STAGE);
-    Ok(store.unwrap_or_else(|| PixelStore::in_memory([width, height])))
+    let sums = store.unwrap_or_else(|| PixelStore::in_memory([width, height]));
+    Ok(Averaged { sums, has_alpha })
 }
 
 /// What is the same for all rows.
@@ -98,14 +107,21 @@ struct Summing<'a> {
 }
 
 impl Summing<'_> {
-    /// Sums over the rows `part` of the canvas, of the photographs at the positions `covering`.
-    fn sums(&self, part: &Range<usize>, covering: &[usize], context: &StageContext) -> Result<Vec<SumPixel>> {
+    /// Sums over the rows `part` of the canvas, of the photographs at the positions `covering`; notes whether one of these `has_alpha`.
+    fn sums(
+        &self,
+        part: &Range<usize>,
+        covering: &[usize],
+        has_alpha: &mut bool,
+        context: &StageContext,
+    ) -> Result<Vec<SumPixel>> {
         let width = self.layout.width;
         let mut sums = vec![[0.0; 4]; width * part.len()];
         for group in covering.chunks(self.input.plan.at_a_time) {
             context.check_cancelled()?;
             let warped: Vec<WarpedPhotograph<'_>> =
                 group.par_iter().map(|&at| self.warped(at)).collect::<Result<_>>()?;
+            *has_alpha |= warped.iter().any(|warped| warped.photograph().0.has_alpha());
             sums.par_chunks_mut(width * BAND_ROWS).enumerate().try_for_each(|(band, sums)| {
                 context.check_cancelled()?;
                 let first = part.start + band * BAND_ROWS;

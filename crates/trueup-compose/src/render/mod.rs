@@ -41,11 +41,11 @@ use crate::pyramid::first_level;
 use crate::render_options::{Composition, Transition};
 use crate::seam::{self, SeamInput, SeamOptions, Seams};
 use crate::small_views::{self, BorderInput, SmallViews, SmallViewsInput, small_size};
-use crate::store::{PixelStore, RootPixel, SumPixel};
+use crate::store::{PixelStore, RootPixel};
 use crate::unframed::Unframed;
 use crate::warped::{Averaging, Resampling};
 use crate::weights::Weighting;
-use average::AverageInput;
+use average::{AverageInput, Averaged};
 use checked::{check, report_folds};
 
 const STAGE: &str = RenderOptions::STAGE;
@@ -59,12 +59,16 @@ pub struct Rendered {
     pub seams: Option<Seams>,
     /// What of the canvas becomes the panorama, if that was decided: nothing else need be composed. `None` if all of it was.
     pub frame: Option<Frame>,
+    /// Whether some photograph has an alpha channel: then all of the canvas was composed, no frame was chosen, and of what grids cover,
+    /// [`Panorama::opaque_part`] is covered.
+    pub has_alpha: bool,
 }
 
 /// Renders the panorama: every photograph warped by its grid, corrected and blended.
 ///
 /// With a `framing`, what becomes of the canvas is decided as soon as the seams are known, if it can be, and what lies outside of
-/// it, and is not read to fill its gaps, is not composed: it stays empty. What is composed is the same as without.
+/// it, and is not read to fill its gaps, is not composed: it stays empty. What is composed is the same as without. Where photographs are
+/// transparent shows when they are composed: with one that has an alpha channel, `framing` decides nothing.
 ///
 /// What does not fit into the memory of `resources` goes to a scratch file, and photographs are decoded again where they
 /// cannot be kept; the panorama is the same to the last bit. A canvas pixel sees the photograph at exactly one position, found by
@@ -98,15 +102,16 @@ pub fn run(
         match composition(layout, options) {
             Composition::AlongSeams(_) => {
                 let helpers = resources.helpers.filter(|_| layout.placed.len() > 1);
-                let (pixels, seams, frame) = composing.along_seams(options, seam_options, framing, helpers, context)?;
+                let AlongSeams { pixels, seams, frame, has_alpha } =
+                    composing.along_seams(options, seam_options, framing, helpers, context)?;
                 let panorama = Panorama::from_roots(size, pixels, composing.photographs.encoding());
-                Ok(Rendered { panorama, seams: Some(seams), frame })
+                Ok(Rendered { panorama, seams: Some(seams), frame, has_alpha })
             }
             Composition::Averaged(weighting) => {
                 let averaging = Averaging { resampling: Resampling::of(options.interpolation), weighting };
-                let sums = composing.averaged(averaging, context)?;
+                let Averaged { sums, has_alpha } = composing.averaged(averaging, context)?;
                 let panorama = Panorama::from_sums(size, sums, composing.photographs.encoding());
-                Ok(Rendered { panorama, seams: None, frame: None })
+                Ok(Rendered { panorama, seams: None, frame: None, has_alpha })
             }
         }
     })
@@ -176,6 +181,15 @@ struct Composing<'a> {
     plan: &'a MemoryPlan,
 }
 
+/// A panorama that was composed along seams.
+struct AlongSeams {
+    pixels: PixelStore<RootPixel>,
+    seams: Seams,
+    /// As in [`Rendered`].
+    frame: Option<Frame>,
+    has_alpha: bool,
+}
+
 /// What composing holds of the panorama.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Holding {
@@ -217,7 +231,7 @@ impl Composing<'_> {
         framing: Option<&Framing<'_>>,
         helpers: Option<&dyn RenderHelpers>,
         context: &StageContext,
-    ) -> Result<(PixelStore<RootPixel>, Seams, Option<Frame>)> {
+    ) -> Result<AlongSeams> {
         let &Self { layout, corrections, local, photographs, plan } = self;
         let levels = whole_levels(layout, options);
         let unrolled = &unrolled(layout, levels)?;
@@ -241,7 +255,10 @@ impl Composing<'_> {
                 small_views::run_elsewhere(&input, make_small, context)?
             }
         };
-        let SmallViews { views, size, coarse_levels, border, decoded } = small;
+        let SmallViews { views, size, coarse_levels, border, decoded, has_alpha } = small;
+        let framing = framing.filter(|_| !has_alpha);
+        let ahead = ahead.filter(|_| !has_alpha);
+        frame = frame.filter(|_| !has_alpha);
         let seams = match views.len() {
             1 => Seams::of_one(size[0], size[1]),
             _ => {
@@ -279,16 +296,18 @@ impl Composing<'_> {
             }
         };
         context.progress().finish(STAGE);
-        Ok((pixels, seams, frame))
+        Ok(AlongSeams { pixels, seams, frame, has_alpha })
     }
 
     /// Means of all photographs.
-    fn averaged(&self, averaging: Averaging, context: &StageContext) -> Result<PixelStore<SumPixel>> {
+    fn averaged(&self, averaging: Averaging, context: &StageContext) -> Result<Averaged> {
         let &Self { layout, corrections, local, photographs, plan } = self;
         average::run(&AverageInput { layout, corrections, local, photographs, averaging, plan }, context)
     }
 }
 
+#[cfg(test)]
+mod alpha_tests;
 #[cfg(test)]
 mod divided_tests;
 #[cfg(test)]

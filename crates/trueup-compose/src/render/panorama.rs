@@ -5,10 +5,10 @@ use std::ops::Range;
 use trueup_core::raster::RowSource;
 use trueup_core::{Error, Result};
 
-use crate::coverage::Rectangle;
+use crate::coverage::{Coverage, Rectangle};
 use crate::store::{PixelStore, RootPixel, SumPixel};
 use crate::transfer_curve::Encoding;
-use crate::weights::alpha;
+use crate::weights::{WHOLE, alpha};
 
 /// The finished panorama: 8 or 16 bytes a pixel in memory or in a scratch file, encoded as its rows are asked for.
 #[derive(Debug)]
@@ -56,6 +56,22 @@ impl Panorama {
         Ok(())
     }
 
+    /// What of a `coverage`, that of the layout it was made of, nothing shows through: photographs may be transparent in part.
+    ///
+    /// # Errors
+    /// [`trueup_core::Error::Io`] if a scratch file cannot be read.
+    pub fn opaque_part(&self, coverage: &Coverage) -> Result<Coverage> {
+        let least = WHOLE * f32::from(u16::MAX);
+        match &self.pixels {
+            PanoramaPixels::Sums(sums) => {
+                coverage.within(|y| Ok(stretches(&sums.row(y)?, |sum| alpha(sum[3]) >= WHOLE)))
+            }
+            PanoramaPixels::Roots(roots) => {
+                coverage.within(|y| Ok(stretches(&roots.row(y)?, |root| f32::from(root[3]) >= least)))
+            }
+        }
+    }
+
     /// Linear light (red, green, blue; 1 is white, more is possible) and alpha (0 to 1) of pixel (x, y); all 0 where no
     /// photograph is.
     ///
@@ -86,6 +102,17 @@ impl Panorama {
         let [r, g, b] = [r, g, b].map(|light| self.encoding.profile_light(light));
         [r, g, b, opacity]
     }
+}
+
+/// The stretches of a row whose pixels are such, in ascending order.
+fn stretches<P>(row: &[P], is_such: impl Fn(&P) -> bool) -> Vec<Range<usize>> {
+    let mut end = 0;
+    let same = row.chunk_by(|one, next| is_such(one) == is_such(next));
+    let ranges = same.map(|chunk| {
+        end += chunk.len();
+        (end - chunk.len()..end, is_such(&chunk[0]))
+    });
+    ranges.filter(|(_, is_such)| *is_such).map(|(range, _)| range).collect()
 }
 
 pub(super) fn linear_of_sum([r, g, b, sum]: SumPixel) -> [f32; 4] {

@@ -77,6 +77,8 @@ pub(crate) struct SmallViews {
     pub(crate) border: Vec<BorderDeviations>,
     /// Decoded photographs.
     pub(crate) decoded: DecodedPhotographs,
+    /// Whether one of them has an alpha channel.
+    pub(crate) has_alpha: bool,
 }
 
 /// Photographs that are decoded already.
@@ -96,6 +98,8 @@ pub struct MadeSmall {
     border: BorderDeviations,
     /// Bytes of the decoded photograph.
     bytes: usize,
+    /// Whether it has an alpha channel.
+    has_alpha: bool,
 }
 
 impl MadeSmall {
@@ -204,6 +208,7 @@ impl SmallViews {
             coarse_levels: CoarseLevels::new(input.plan.coarse_levels.clone()),
             border: Vec::new(),
             decoded: DecodedPhotographs { kept: Vec::new(), bytes: Vec::new() },
+            has_alpha: false,
         }
     }
 
@@ -211,6 +216,7 @@ impl SmallViews {
     fn push(&mut self, made: MadeSmall, photograph: Option<Photograph>) -> Result<()> {
         self.views.push(made.view);
         self.border.push(made.border);
+        self.has_alpha |= made.has_alpha;
         made.coarse_levels.into_iter().try_for_each(|level| self.coarse_levels.push(level))?;
         self.decoded.bytes.push(made.bytes);
         self.decoded.kept.push(photograph);
@@ -267,8 +273,8 @@ impl Making<'_> {
         let (view, coarse_levels) = rayon::join(view, coarse_levels);
         drop(warped);
         let border = self.border(&first, &photograph, correction);
-        let bytes = photograph.bytes();
-        Ok((MadeSmall { view, coarse_levels, border, bytes }, photograph))
+        let (bytes, has_alpha) = (photograph.bytes(), photograph.has_alpha());
+        Ok((MadeSmall { view, coarse_levels, border, bytes, has_alpha }, photograph))
     }
 
     /// What the photograph, placed in the first turn, alone shows at the border.

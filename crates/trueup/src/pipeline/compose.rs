@@ -143,6 +143,11 @@ pub(crate) fn run(
         // What is filled counts as covered: where all gaps are, the frame is chosen last.
         let mut rendered = render((!fills).then_some(&framing))?;
         context.time("crop", || {
+            let photographed = match rendered.has_alpha {
+                true => rendered.panorama.opaque_part(&photographed)?,
+                false => photographed.clone(),
+            };
+            let framing = Framing { coverage: &photographed, ..framing };
             if !fills {
                 return framed(rendered, layout, &framing, &photographed, context);
             }
