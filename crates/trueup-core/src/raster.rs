@@ -102,6 +102,25 @@ impl<T: Copy + Default> Raster<T> {
     }
 }
 
+impl<T: Copy + PartialEq> Raster<T> {
+    /// See [`Photograph::without_full_alpha`]; `full` is what is opaque.
+    fn without_full_alpha(mut self, full: T) -> Self {
+        const RGBA: usize = 4;
+        let (pixels, _) = self.data.as_chunks::<RGBA>();
+        if self.channels != RGBA || !pixels.iter().all(|pixel| pixel[3] == full) {
+            return self;
+        }
+        // In place: there may be no room for both.
+        for pixel in 0..pixels.len() {
+            self.data.copy_within(RGBA * pixel..RGBA * pixel + RGBA - 1, (RGBA - 1) * pixel);
+        }
+        self.channels = RGBA - 1;
+        self.data.truncate(self.width * self.height * self.channels);
+        self.data.shrink_to_fit();
+        self
+    }
+}
+
 /// A decoded photograph at its own depth: 8 or 16 bits a sample, 1 (gray), 3 (RGB) or 4 (RGBA) channels, sRGB-like
 /// encoding, already in its upright orientation.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -148,6 +167,15 @@ impl Photograph {
     /// Whether it has an alpha channel, so that parts of it may be transparent.
     pub fn has_alpha(&self) -> bool {
         self.channels() == 4
+    }
+
+    /// The same without an alpha channel through which nothing shows anywhere; one through which something does stays.
+    #[must_use]
+    pub fn without_full_alpha(self) -> Self {
+        match self {
+            Self::Eight(raster) => Self::Eight(raster.without_full_alpha(u8::MAX)),
+            Self::Sixteen(raster) => Self::Sixteen(raster.without_full_alpha(u16::MAX)),
+        }
     }
 
     /// Samples per pixel: 1, 3 or 4.
@@ -242,6 +270,21 @@ mod tests {
         assert_eq!(eight, [1, 2, 3, 255, 0, 255, 7, 255]);
         assert_eq!(sixteen, [257, 514, 771, 65535, 0, 65535, 1799, 65535]);
         assert!(picture.linear_row(0, &mut [0.0; 8]).is_err());
+    }
+
+    #[test]
+    fn alpha_that_is_full_everywhere_is_left_out() {
+        let two = |last: u8| {
+            Photograph::Eight(Raster::from_data(2, 1, 4, vec![1, 2, 3, 255, 4, 5, 6, last]).expect("eight samples"))
+        };
+        let opaque = two(255).without_full_alpha();
+        assert_eq!(opaque, Photograph::Eight(Raster::from_data(2, 1, 3, vec![1, 2, 3, 4, 5, 6]).expect("six samples")));
+        assert_eq!(opaque.clone().without_full_alpha(), opaque);
+        assert_eq!(two(254).without_full_alpha(), two(254));
+        let deep = |alpha| Photograph::Sixteen(Raster::from_data(1, 1, 4, vec![1, 2, 3, alpha]).expect("four samples"));
+        assert_eq!([deep(u16::MAX), deep(255)].map(|one| one.without_full_alpha().channels()), [3, 4]);
+        let none = Photograph::Eight(Raster::new(0, 0, 4));
+        assert_eq!(none.without_full_alpha().channels(), 3);
     }
 
     #[test]

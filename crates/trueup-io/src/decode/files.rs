@@ -221,7 +221,10 @@ impl FilePhotographs {
 
     /// One file, or what is in memory in its place, in the common color space.
     fn decoded(&self, source: &SourceImage, conversion: Option<&Conversion>) -> Result<Photograph> {
-        let given = self.in_memory.of(source).map(|photograph| source.inset.cut(photograph.as_ref().clone()));
+        let given = self
+            .in_memory
+            .of(source)
+            .map(|photograph| source.inset.cut(photograph.as_ref().clone()).map(Photograph::without_full_alpha));
         let decoded = given.unwrap_or_else(|| photograph(source))?;
         match (conversion, source.light.and_then(TransferCurve::light)) {
             (None, _) => Ok(decoded),

@@ -15,7 +15,7 @@ use crate::metadata::header;
 
 /// Decodes a photograph in full size, upright, without what lies beside it in its file.
 ///
-/// Gray stays one channel; gray with alpha becomes RGBA; palettes, CMYK and one-bit photographs become RGB or gray;
+/// Gray stays one channel; gray with alpha becomes RGBA; alpha that is full everywhere is left out; palettes, CMYK and one-bit photographs become RGB or gray;
 /// 16 bits a sample stay 16; floating point is taken for linear light, 1 for white, and becomes 16 bits of sRGB, what is
 /// brighter than white becoming white; with [`SourceImage::light`], 16 bits of that, in which it stays.
 ///
@@ -28,7 +28,8 @@ pub fn photograph(source: &SourceImage) -> Result<Photograph> {
         Photograph::Eight(raster) => Photograph::Eight(upright(raster, source.orientation)),
         Photograph::Sixteen(raster) => Photograph::Sixteen(upright(raster, source.orientation)),
     };
-    source.inset.cut(picture)
+    // Full alpha says nothing, and kernels would have to weigh colors by it.
+    Ok(source.inset.cut(picture)?.without_full_alpha())
 }
 
 /// Bits of a sample in a photograph's file: 8 or 16, for floating point 16, 32 or 64.

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use tempfile::TempDir;
 use trueup_core::color::{LightRange, TransferCurve};
-use trueup_core::raster::Photograph;
+use trueup_core::raster::{Photograph, Raster};
 use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_core::{Error, StageContext};
 
 use super::*;
 use crate::formats::specimens::{Container, Specimen};
-use crate::source::{SourceOptions, scan};
+use crate::source::{InMemory, SourceOptions, scan};
 
 const WIDTH: u32 = 45;
 const HEIGHT: u32 = 33;
@@ -220,6 +220,27 @@ fn jpegs_with_a_scan_per_component_and_reduced_color_are_decoded() {
             assert!(together.abs_diff(*separate) <= 12, "{factor:?}: {together} {separate}");
         }
     }
+}
+
+/// An alpha channel that is full everywhere is none: in files, and in memory.
+#[test]
+fn opaque_photographs_are_the_same_with_alpha_and_without() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let opaque = |x, y| [value(x, y, 0), value(x, y, 1), value(x, y, 2), 255];
+    let eight = [rgb8(), Specimen::eight(WIDTH, HEIGHT, opaque)];
+    for format in [Container::Png, Container::Tiff, Container::WebP] {
+        let [without, with] = [0, 1].map(|one| {
+            photograph(&examine(write(&folder, "picture", &eight[one].file(format)))).expect("a photograph")
+        });
+        assert!(with == without && with.channels() == 3, "{format:?}");
+    }
+    let given = Raster::from_data(2, 1, 4, vec![1_u8, 2, 3, 255, 4, 5, 6, 255]).expect("eight samples");
+    let mut in_memory = InMemory::default();
+    in_memory.insert("given", Photograph::Eight(given));
+    let source = SourceImage::unknown("given", "given", [2, 1]);
+    let photographs = FilePhotographs::new(vec![source], 0).with_in_memory(in_memory);
+    let expected = Raster::from_data(2, 1, 3, vec![1_u8, 2, 3, 4, 5, 6]).expect("six samples");
+    assert_eq!(photographs.photograph(0).expect("in memory"), Photograph::Eight(expected));
 }
 
 #[test]
