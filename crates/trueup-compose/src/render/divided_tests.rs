@@ -1,22 +1,24 @@
 //! Rendering that is divided, by helpers that take everything in the wrong order and hand it over as bytes.
 
+use std::ops::Range;
 use std::sync::Mutex;
 
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 use super::test_rendering::bits;
 use super::within_tests::scene;
 use super::*;
 use crate::coverage::Coverage;
-use crate::crop::Crop;
+use crate::crop::{BorderDeviations, Crop};
 use crate::layout::{CanvasLayout, CanvasOptions};
 use crate::light::Corrections;
-use crate::small_views::MadeSmall;
+use crate::pyramid::PyramidPlane;
+use crate::small_views::{CoarseLevel, MadeSmall, SmallView};
 use crate::test_photographs::RamDisk;
 
 /// How helpers fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 enum Fault {
     Never,
     /// One photograph, or region, is handed over twice.
@@ -25,6 +27,21 @@ enum Fault {
     Forgotten,
     /// Tiles of another region come for the first.
     Exchanged,
+    /// Photographs that were made small are no such.
+    Damaged(Damage),
+}
+
+/// What is done to a photograph that was made small.
+type Damage = fn(&mut Made);
+
+/// [`MadeSmall`], as it is written.
+#[derive(Serialize, Deserialize)]
+struct Made {
+    view: SmallView,
+    coarse_levels: Vec<CoarseLevel>,
+    border: BorderDeviations,
+    bytes: usize,
+    has_alpha: bool,
 }
 
 /// Helpers in this program.
@@ -36,16 +53,27 @@ struct Here<'a> {
 }
 
 fn handed_over<T: Serialize + DeserializeOwned>(value: &T) -> T {
+    taken_for(value)
+}
+
+/// What is written of one thing, read as another.
+fn taken_for<T: DeserializeOwned>(value: &impl Serialize) -> T {
     rmp_serde::from_slice(&rmp_serde::to_vec_named(value).expect("written")).expect("read")
 }
 
 impl RenderHelpers for Here<'_> {
     fn make_small(&self, work: &SmallWork, positions: &[usize], take: TakeSmall<'_>) -> Result<()> {
-        let skipped = usize::from(self.fault == Fault::Forgotten);
+        let skipped = usize::from(matches!(self.fault, Fault::Forgotten));
         for position in positions.iter().rev().skip(skipped) {
             let mut made = |position, one: MadeSmall| {
-                if self.fault == Fault::Twice {
-                    take(position, handed_over(&one))?;
+                match self.fault {
+                    Fault::Twice => take(position, handed_over(&one))?,
+                    Fault::Damaged(damage) => {
+                        let mut made: Made = taken_for(&one);
+                        damage(&mut made);
+                        return take(position, taken_for(&made));
+                    }
+                    Fault::Never | Fault::Forgotten | Fault::Exchanged => {}
                 }
                 take(position, handed_over(&one))
             };
@@ -60,7 +88,7 @@ impl RenderHelpers for Here<'_> {
         for number in (0..count).rev() {
             let (work, context) = (handed_over(work), StageContext::default());
             let resources = Resources::unlimited();
-            let asked = if self.fault == Fault::Exchanged { (number + 1) % count } else { number };
+            let asked = if matches!(self.fault, Fault::Exchanged) { (number + 1) % count } else { number };
             let region = handed_over(&region(asked)?);
             let finished = finish_region(&self.input, &resources, self.options, &work, region, &context)?;
             take(number, handed_over(&finished))?;
@@ -120,6 +148,35 @@ fn helpers_that_mix_things_up_are_told() {
         let message = refused.expect_err("a fault").to_string();
         assert!(message.contains("does not belong to this panorama"), "{fault:?}: {message}");
     }
+}
+
+#[test]
+fn damaged_photographs_are_told() {
+    let (plane, ..) = scene();
+    let around = CanvasLayout { width: 1536, period: Some(1536), ..plane.clone() };
+    let damages: [Damage; 10] = [
+        |made| made.view.pixels.truncate(9),
+        |made| made.view.columns = move_by_9000(&made.view.columns),
+        |made| made.view.rows = move_by_9000(&made.view.rows),
+        |made| made.view = SmallView { columns: 9..3, rows: 0..usize::MAX, pixels: Vec::new() },
+        |made| made.view = SmallView { columns: 0..2, rows: 0..usize::MAX / 2 + 1, pixels: Vec::new() },
+        |made| made.coarse_levels.truncate(0),
+        |made| made.coarse_levels[0].plane.columns = move_by_9000(&made.coarse_levels[0].plane.columns),
+        |made| made.coarse_levels[0].plane.rows = move_by_9000(&made.coarse_levels[0].plane.rows),
+        |made| made.coarse_levels[0].plane = PyramidPlane { columns: 9..usize::MAX, ..PyramidPlane::default() },
+        |made| made.bytes = usize::MAX,
+    ];
+    for (number, damage) in damages.into_iter().enumerate() {
+        for layout in [&plane, &around] {
+            let refused = both(layout, &RenderOptions::default(), Fault::Damaged(damage), usize::MAX, Crop::None);
+            let message = refused.map(drop).expect_err("a fault").to_string();
+            assert!(message.contains("does not belong to this panorama"), "{number}: {message}");
+        }
+    }
+}
+
+fn move_by_9000(range: &Range<usize>) -> Range<usize> {
+    range.start + 9000..range.end + 9000
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod size;
 mod view;
 
 use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -102,10 +103,35 @@ pub struct MadeSmall {
     has_alpha: bool,
 }
 
+/// Bytes of a decoded pixel, at most: four channels of 16 bits.
+const MOST_PIXEL_BYTES: f64 = 8.0;
+
 impl MadeSmall {
-    /// Whether it can have been made of a photograph that is placed so often.
-    fn fits(&self, placements: usize) -> bool {
-        self.coarse_levels.len() == placements && self.coarse_levels.iter().all(|level| level.plane.is_whole())
+    /// Whether it can have been made of the photograph at a position: boxes lie on their canvases and have their pixels.
+    fn fits(&self, input: &SmallViewsInput<'_>, position: usize) -> bool {
+        let unrolled = input.unrolled;
+        let layout = unrolled.original_layout();
+        let lies_within = |range: &Range<usize>, length: usize| range.start <= length && range.end <= length;
+        let [width, height] = small_size([layout.width, layout.height], layout.period.is_some());
+        let Self { view, coarse_levels, bytes, .. } = self;
+        // On a cylinder, a view may run into the next turn.
+        let turns = if layout.period.is_some() { 2 } else { 1 };
+        let is_view = lies_within(&view.columns, turns * width)
+            && view.columns.len() <= width
+            && lies_within(&view.rows, height)
+            && view.columns.len() * view.rows.len() == view.pixels.len();
+        let samples = |length: usize| input.first_level.map_or(0, |level| length.div_ceil(1 << level));
+        let [samples_across, samples_down] = unrolled.canvas().map(samples);
+        let is_level = |CoarseLevel { plane }: &CoarseLevel| {
+            lies_within(&plane.columns, samples_across) && lies_within(&plane.rows, samples_down) && plane.is_whole()
+        };
+        let is_as_large = layout.placed.get(position).is_some_and(|placed| {
+            *bytes as f64 <= placed.mesh.width.round() * placed.mesh.height.round() * MOST_PIXEL_BYTES
+        });
+        is_view
+            && coarse_levels.len() == unrolled.placements(position).count()
+            && coarse_levels.iter().all(is_level)
+            && is_as_large
     }
 }
 
@@ -139,15 +165,14 @@ pub(crate) fn run_elsewhere(
     make_small: impl FnOnce(&[usize], TakeSmall<'_>) -> Result<()>,
     context: &StageContext,
 ) -> Result<SmallViews> {
-    let unrolled = input.unrolled;
     let mut all = SmallViews::none(input);
-    let positions: Vec<usize> = (0..unrolled.original_layout().placed.len()).collect();
+    let positions: Vec<usize> = (0..input.unrolled.original_layout().placed.len()).collect();
     let mut waiting: Vec<Option<MadeSmall>> = positions.iter().map(|_| None).collect();
     let mut next = 0;
     make_small(&positions, &mut |position, made| {
         context.check_cancelled()?;
         let is_wanted = waiting.get(position).is_some_and(Option::is_none) && position >= next;
-        if !(is_wanted && made.fits(unrolled.placements(position).count())) {
+        if !(is_wanted && made.fits(input, position)) {
             return Err(not_asked_for());
         }
         context.progress().advance(RenderOptions::STAGE, 1);
