@@ -15,14 +15,12 @@ use crate::simd::{VectorLoop, with_vector_instructions};
 use crate::small_views::CoarseLevel;
 use crate::store::RootPixel;
 use crate::warped::{RowSink, SamplingMemory, WarpedPhotograph};
-use crate::window::{Window, common};
+use crate::window::{Window, common, widened};
 
 /// A box with so many pixels more on all sides, cut at the canvas.
 fn grown([columns, rows]: [&Range<usize>; 2], margin: usize, work: &BlendWork<'_>) -> (Range<usize>, Range<usize>) {
-    let grown =
-        |range: &Range<usize>, length: usize| range.start.saturating_sub(margin)..(range.end + margin).min(length);
     let [width, height] = work.shown.unrolled.canvas();
-    (grown(columns, width), grown(rows, height))
+    (widened(columns, margin, width), widened(rows, margin, height))
 }
 
 /// A part of the canvas; `columns` and `rows` start at multiples of 2^first_level.

@@ -33,6 +33,7 @@ use trueup_core::{Error, Result};
 use crate::pyramid::{
     LEAST_WEIGHT, PyramidPlane, Texel, add_base, add_detail, collapse, first_level, level_shares, mask_margin,
 };
+use crate::window::widened;
 use exposure::Exposure;
 pub use radiance::merge;
 use weights::normalized_weights;
@@ -207,9 +208,7 @@ fn tiles([width, height]: [usize; 2], side: usize) -> Vec<Part> {
 
 /// A part with so many pixels more on all sides, as far as the picture goes.
 fn grown(columns: &Range<usize>, rows: &Range<usize>, margin: usize, [width, height]: [usize; 2]) -> Part {
-    let grown =
-        |range: &Range<usize>, length: usize| range.start.saturating_sub(margin)..(range.end + margin).min(length);
-    (grown(columns, width), grown(rows, height))
+    (widened(columns, margin, width), widened(rows, margin, height))
 }
 
 /// Colors and weights of all exposures within a window.

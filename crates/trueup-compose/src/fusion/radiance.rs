@@ -14,6 +14,7 @@
 //! Means are of light, not of its logarithm, whose noise in the dark is lopsided. Weights end smoothly before white, where compression
 //! moves samples, for all channels of a pixel together, so that no color is seen of it.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -169,13 +170,15 @@ struct Member<'a> {
 fn merged_row(members: &[Member], table: &SampleLight, columns: Range<usize>, y: usize) -> Vec<[f32; 3]> {
     let mut sums = vec![[[0.0_f32; 2]; 3]; columns.len()];
     let darkest = members.iter().map(|member| member.factor).fold(f32::INFINITY, f32::min);
-    let reference: Vec<Option<[f32; 4]>> =
-        members[0].exposure.trusted_row(columns.clone(), y).into_iter().map(|(sample, _)| sample).collect();
-    for Member { exposure, factor } in members {
+    let reference = members[0].exposure.trusted_row(columns.clone(), y);
+    for (number, Member { exposure, factor }) in members.iter().enumerate() {
         // In doubt, far more the darker of two exposures.
         let doubtful = LEAST_WEIGHT * (darkest / factor).powi(4);
-        let own = exposure.trusted_row(columns.clone(), y);
-        for ((sum, reference), (sample, trust)) in sums.iter_mut().zip(&reference).zip(own) {
+        let own = match number {
+            0 => Cow::Borrowed(&reference),
+            _ => Cow::Owned(exposure.trusted_row(columns.clone(), y)),
+        };
+        for ((sum, (reference, _)), &(sample, trust)) in sums.iter_mut().zip(&reference).zip(own.iter()) {
             let Some(own @ [r, g, b, _]) = sample else { continue };
             let trust = match reference {
                 Some(reference) => trust + (1.0 - trust) * table.continues(reference, &own, *factor),

@@ -11,6 +11,7 @@ use crate::coverage::Rectangle;
 use crate::gaps::Gaps;
 use crate::pyramid::{PyramidPlane, color, first_level, tile_margin, tile_side};
 use crate::store::{Pixel, PixelStore, RootPixel, SumPixel};
+use crate::window::widened;
 
 /// A pixel whose color can be looked at and set.
 trait Shade: Pixel {
@@ -170,9 +171,8 @@ impl<'a> Canvas<'a> {
     /// A tile with what its levels are made of beside it.
     fn with_margin(&self, tile: &FillTile) -> (Range<usize>, Range<usize>) {
         let margin = tile_margin(self.first_level);
-        let grown =
-            |range: &Range<usize>, length: usize| range.start.saturating_sub(margin)..(range.end + margin).min(length);
-        (grown(&tile.columns, self.width + 2 * self.lead), grown(&tile.rows, self.height))
+        let width = self.width + 2 * self.lead;
+        (widened(&tile.columns, margin, width), widened(&tile.rows, margin, self.height))
     }
 
     /// Columns of this canvas in stretches that lie beside each other in the panorama: the first of each, and the
@@ -229,8 +229,8 @@ impl<'a> Canvas<'a> {
     /// where it does nowhere.
     fn beside_gaps(&self, columns: &Range<usize>, rows: &Range<usize>) -> Option<Vec<bool>> {
         let border = self.border();
-        let wide = columns.start.saturating_sub(border)..(columns.end + border).min(self.width + 2 * self.lead);
-        let high = rows.start.saturating_sub(border)..(rows.end + border).min(self.height);
+        let wide = widened(columns, border, self.width + 2 * self.lead);
+        let high = widened(rows, border, self.height);
         let stretches = self.stretches(&wide);
         let across = |y: usize| {
             let of_stretch = |(first, own): (usize, Range<usize>)| {
