@@ -1,8 +1,10 @@
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 
 use proptest::prelude::*;
 use trueup_core::color::TransferCurve;
+use trueup_core::mask::Mask;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::{Photograph, Raster};
 
@@ -150,7 +152,7 @@ fn no_border_of_the_panorama_is_darker_than_its_photographs() {
 fn with_work<T>(
     lefts: &[usize],
     first_level: u32,
-    test: impl FnOnce(&BlendWork<'_>, &[Option<WarpedPhotograph<'_>>]) -> T,
+    test: impl FnOnce(&mut BlendWork<'_>, &[Option<WarpedPhotograph<'_>>]) -> T,
 ) -> T {
     let layout = layout(lefts);
     let photographs: Vec<Photograph> = (0..lefts.len())
@@ -181,7 +183,7 @@ fn with_work<T>(
     let levels = Some(BlendedLevels::new(small.coarse_levels, shown, levels).expect("in memory"));
     let ignored = vec![None; unrolled.placed().len()];
     let resampling = Resampling::of(Interpolation::Bicubic);
-    let work = BlendWork { resampling, shown, first_level, levels, ignored };
+    let mut work = BlendWork { resampling, shown, first_level, levels, ignored };
     let light = PhotographLight { curve: &TransferCurve::SRGB, correction: &Correction::default(), local: None };
     let warped: Vec<Option<WarpedPhotograph<'_>>> = photographs
         .into_iter()
@@ -190,7 +192,7 @@ fn with_work<T>(
             Some(WarpedPhotograph::new(Cow::Owned(photograph), &placed.mesh, canvas, light, &resampling))
         })
         .collect();
-    test(&work, &warped)
+    test(&mut work, &warped)
 }
 
 fn blended(
@@ -214,7 +216,7 @@ fn blended(
 #[test]
 fn tiles_of_any_size_give_the_same_bits_as_the_whole() {
     for first_level in [3, 4] {
-        with_work(&[0, 60, 130], first_level, assert_that_tiles_give_the_whole);
+        with_work(&[0, 60, 130], first_level, |work, photographs| assert_that_tiles_give_the_whole(work, photographs));
     }
 }
 
@@ -235,6 +237,30 @@ fn assert_that_tiles_give_the_whole(work: &BlendWork<'_>, photographs: &[Option<
             }
         }
     }
+}
+
+/// All of one photograph is ignored, and where the other is shown, that one ends three columns ahead of the canvas: the seams, found in small
+/// views, know no better. Who else is there is seen in these columns.
+#[test]
+fn what_is_ignored_fills_what_nobody_else_covers() {
+    with_work(&[0, 60], 3, |work, photographs| {
+        let [width, height] = work.shown.unrolled.canvas();
+        let moved = |number: usize, left: usize| {
+            let photograph = photographs[number].as_ref().expect("a photograph").photograph().0.clone();
+            let light =
+                PhotographLight { curve: &TransferCurve::SRGB, correction: &Correction::default(), local: None };
+            let mesh = &layout(&[left]).placed[0].mesh;
+            Some(WarpedPhotograph::new(Cow::Owned(photograph), mesh, [width, height], light, &work.resampling))
+        };
+        let photographs = [moved(0, 60), moved(1, 57)];
+        let opacity = |work: &BlendWork<'_>| -> Vec<u16> {
+            let pixels = blended(work, &photographs, 0..width, 0..height);
+            pixels[50 * width..][170..width].iter().map(|pixel| pixel[3]).collect()
+        };
+        assert_eq!(opacity(work), [u16::MAX; 40]);
+        work.ignored[0] = Some(Arc::new(Mask::from_fn(WIDTH, HEIGHT, |_, _| true)));
+        assert_eq!(opacity(work), [u16::MAX; 40]);
+    });
 }
 
 #[test]

@@ -222,6 +222,11 @@ impl BlendTile {
         let (columns, rows) = grown([&self.columns, &self.rows], tile_margin(work.first_level), work);
         let mut sums = zero_levels(&columns, &rows, work.first_level);
         let mut opacity = vec![0.0_f32; self.columns.len() * self.rows.len()];
+        let instead = match claim {
+            // All that is hidden lies below what covers it wholly.
+            Claim::OwnersAlone => None,
+            Claim::Everyone => self.shown_instead([&columns, &rows], masks, work, shown, scratch),
+        };
         let mut owned = match claim {
             Claim::OwnersAlone => columns.len() * rows.len(),
             Claim::Everyone => 0,
@@ -244,7 +249,8 @@ impl BlendTile {
                 *texel = [r * share, g * share, b * share, share];
             }
             self.add_opacity(&plane, &mut opacity);
-            hide_ignored(&mut plane, &weights, photograph, work.ignored[usize::from(*label)].as_deref());
+            let ignored = work.ignored[usize::from(*label)].as_deref();
+            hide_ignored(&mut plane, &weights, photograph, ignored, instead.as_deref());
             let mut mask: Cow<'_, PyramidPlane<f32>> = Cow::Borrowed(mask);
             for (level, sum) in sums.iter_mut().enumerate() {
                 mask = Cow::Owned(mask.reduced());
@@ -281,6 +287,31 @@ impl BlendTile {
             finish_all(&row, out);
         }
         Some(())
+    }
+
+    /// Where in a window what is shown by `masks` covers anything; `None` if nobody asks because nothing is ignored. Labels may reach beyond
+    /// what a photograph covers: they were found in small views.
+    fn shown_instead(
+        &self,
+        [columns, rows]: [&Range<usize>; 2],
+        masks: &[PyramidPlane<f32>],
+        work: &BlendWork<'_>,
+        shown: &[(Label, &WarpedPhotograph<'_>)],
+        scratch: &mut SamplingMemory,
+    ) -> Option<Vec<bool>> {
+        if shown.iter().all(|(label, _)| work.ignored[usize::from(*label)].is_none()) {
+            return None;
+        }
+        let mut covered = vec![false; columns.len() * rows.len()];
+        for ((_, photograph), mask) in shown.iter().zip(masks) {
+            let mut pixels = vec![[0.0; 4]; covered.len()];
+            photograph.sample(self.window(columns, rows), &mut pixels, &work.resampling, scratch);
+            let weights = mask.part(columns, rows);
+            for ((covered, pixel), weight) in covered.iter_mut().zip(&pixels).zip(&weights.texels) {
+                *covered |= pixel[3] > 0.0 && *weight > 0.0;
+            }
+        }
+        Some(covered)
     }
 
     /// Where each photograph is shown, 0 or 1.
@@ -399,18 +430,20 @@ fn zero_levels(columns: &Range<usize>, rows: &Range<usize>, first_level: u32) ->
 }
 
 /// Takes from a photograph's `plane` what its photographer ignores and another photograph is shown for, so that nothing
-/// of it reaches over the seam.
+/// of it reaches over the seam; `instead` says where another one covers anything, everywhere if not given.
 fn hide_ignored(
     plane: &mut PyramidPlane<[f32; 4]>,
     shown: &PyramidPlane<f32>,
     photograph: &WarpedPhotograph<'_>,
     ignored: Option<&Mask>,
+    instead: Option<&[bool]>,
 ) {
     let Some(ignored) = ignored else { return };
     let (columns, rows) = (plane.columns.clone(), plane.rows.clone());
     photograph.grid().each_place(&columns, &rows, |[x, y], place, _| {
         let at = (y - rows.start) * columns.len() + x - columns.start;
-        if shown.texels[at] == 0.0 && ignored.contains(in_mask(ignored, place, photograph.grid().size)) {
+        let is_shown_instead = shown.texels[at] == 0.0 && instead.is_none_or(|covered| covered[at]);
+        if is_shown_instead && ignored.contains(in_mask(ignored, place, photograph.grid().size)) {
             plane.texels[at] = [0.0; 4];
         }
     });
