@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::coverage::{Coverage, Rectangle};
 use crate::distance::border_distances;
 use crate::layout::CanvasLayout;
-use crate::window::common;
+use crate::window::{common, near};
 
 /// What no photograph covers of a canvas, told apart into gaps, which may be filled, and voids.
 #[derive(Debug, Clone)]
@@ -56,7 +56,8 @@ impl Gaps {
     /// All that is not covered of a rectangle of the canvas.
     pub fn within(layout: &CanvasLayout, coverage: Coverage, rectangle: Rectangle) -> Self {
         let size = [layout.width, layout.height];
-        let radius = 0.5 * deepest(&coverage, &rectangle);
+        let is_turn = layout.period.is_some() && rectangle.columns == (0..layout.width);
+        let radius = 0.5 * deepest(&coverage, &rectangle, is_turn);
         let extent = Extent::Within(rectangle);
         Self { coverage, size, corner: corner(layout), extent, around: layout.period.is_some(), radius }
     }
@@ -190,8 +191,9 @@ fn corner(layout: &CanvasLayout) -> [i64; 2] {
     layout.origin.map(|length| (length * layout.canvas_from_target).round().clamp(-FARTHEST, FARTHEST) as i64)
 }
 
-/// Pixels, at most, from what is not covered of a rectangle to what is; 0 if nothing is covered.
-fn deepest(coverage: &Coverage, rectangle: &Rectangle) -> f64 {
+/// Pixels, at most, from what is not covered of a rectangle to what is; 0 if nothing is covered. `is_turn` if its last column lies beside the
+/// first.
+fn deepest(coverage: &Coverage, rectangle: &Rectangle, is_turn: bool) -> f64 {
     /// Cells that the rectangle is looked at in, at most: a distance need not be exact.
     const CELLS: usize = 1 << 14;
     /// Steps across corners are longer.
@@ -211,7 +213,7 @@ fn deepest(coverage: &Coverage, rectangle: &Rectangle) -> f64 {
         for at in front {
             let (x, y) = (at % columns, at / columns);
             for v in y.saturating_sub(1)..(y + 2).min(rows) {
-                for u in x.saturating_sub(1)..(x + 2).min(columns) {
+                for u in near(x, 1, columns, is_turn) {
                     if !std::mem::replace(&mut is_reached[v * columns + u], true) {
                         next.push(v * columns + u);
                     }
@@ -311,6 +313,17 @@ mod tests {
         assert_eq!(place(&part, [100, 50]), ([138, 139], 43));
         let turn = layout(250, 60, &[[0.0; 2]], Some(250));
         assert_eq!(place(&turn, [249, 3]), ([249, 0], 3));
+    }
+
+    /// A hole across the cut of a full turn is as wide as it is anywhere else.
+    #[test]
+    fn a_hole_across_the_cut_is_one() {
+        let radius = |lefts: [f64; 2]| {
+            // Two photographs of 100 columns beside each other on 250: 50 columns are empty.
+            let layout = layout(250, 60, &lefts.map(|left| [left, 0.0]), Some(250));
+            Gaps::within(&layout, Coverage::of(&layout), Rectangle::whole([250, 60])).radius()
+        };
+        assert_eq!(radius([0.0, 100.0]), radius([25.0, 125.0]));
     }
 
     #[test]

@@ -9,6 +9,7 @@ use super::worth::{UpperEnd, Worth};
 use crate::coverage::{Coverage, Rectangle};
 use crate::gaps::FRAME_REACH;
 use crate::layout::CanvasLayout;
+use crate::window;
 
 /// What a cell of a thing that stands out is worth beside a calm one, which is worth 1.
 const THING: f32 = 4.0;
@@ -73,7 +74,7 @@ impl<'a> Choice<'a> {
     /// Among the rectangles of a canvas that is seen in `cells`.
     pub(super) fn new(cells: &'a Cells, layout: &'a CanvasLayout, coverage: &'a Coverage) -> Self {
         let mut worth = Worth::of(cells);
-        worth.ends = widened(&worth.ends, (BEARER * f64::from(longer_side(cells))).round() as usize);
+        worth.ends = widened(&worth.ends, (BEARER * f64::from(longer_side(cells))).round() as usize, cells.around);
         let reach = (FRAME_REACH * layout.photograph_side() / cells.side as f64) as usize;
         let reach = reach.min(cells.columns + cells.rows);
         let sky = Fillable::of(cells, Smoothness::SKY, reach);
@@ -147,10 +148,10 @@ fn worths(cells: &Cells, worth: &Worth, fillable: &Fillable, free_rows: usize) -
     }
 }
 
-/// The highest end within `reach` columns of each.
-fn widened(ends: &[Option<UpperEnd>], reach: usize) -> Vec<Option<UpperEnd>> {
-    let near = |x: usize| ends[x.saturating_sub(reach)..(x + reach + 1).min(ends.len())].iter().flatten();
-    (0..ends.len()).map(|x| near(x).min_by_key(|end| end.row).copied()).collect()
+/// The highest end within `reach` columns of each, `around` a full turn across its ends, too.
+pub(super) fn widened(ends: &[Option<UpperEnd>], reach: usize, around: bool) -> Vec<Option<UpperEnd>> {
+    let beside = |x: usize| window::near(x, reach, ends.len(), around).filter_map(|other| ends[other].as_ref());
+    (0..ends.len()).map(|x| beside(x).min_by_key(|end| end.row).copied()).collect()
 }
 
 /// A rectangle of cells in pixels, with the rows and columns of pixels around it that are open all along.

@@ -266,3 +266,58 @@ fn holes_are_seen() {
     // The hole is 20 x 20 pixels of the second cell; cells at the end are as large as there are pixels.
     assert_eq!(coverage.in_cells(50), [2500, 2500 - 400, 1000, 500, 500, 200]);
 }
+
+/// The cells of a full turn of 90 x 60, with things all along it, and an empty hole across its cut, turned by so many columns.
+fn turned(by: usize) -> Cells {
+    const SIZE: [usize; 2] = [90, 60];
+    let [columns, rows] = SIZE;
+    let place = |at: usize| ((at % columns + columns - by) % columns, at / columns);
+    let is_covered = |(x, y): (usize, usize)| y >= 3 && !((x < 6 || x >= 76) && (40..52).contains(&y));
+    let level = |(x, y): (usize, usize)| match (y > 20 + x * 7 % 13, (x + 3) % columns < 6 && y > 12) {
+        (true, _) => 40.0 + f32::from(rough(x, y)) / 2.0,
+        (false, true) => 70.0,
+        _ => 200.0 + (x % 5) as f32,
+    };
+    let all = || (0..columns * rows).map(place);
+    Cells {
+        side: 4,
+        columns,
+        rows,
+        covered: all().map(is_covered).collect(),
+        colors: all().map(|place| [level(place); 3]).collect(),
+        deviations: all().map(|(x, y)| f32::from(rough(x, y)) / 30.0).collect(),
+        around: true,
+    }
+}
+
+/// A full turn has no ends: what matters of it, and what may be filled, is the same wherever it is cut.
+#[test]
+fn a_full_turn_is_judged_alike_wherever_it_is_cut() {
+    let whole = turned(0);
+    let (columns, rows) = (whole.columns, whole.rows);
+    let [worth, fillable] = [worth::Worth::of(&whole).salience, smooth_shares(&whole)];
+    let ends = |cells: &Cells| auto::widened(&worth::Worth::of(cells).ends, 2, cells.around);
+    let expected_ends = ends(&whole);
+    assert!(expected_ends.iter().flatten().count() > 5, "there are things that end");
+    for by in [1, 17, 45] {
+        let cells = turned(by);
+        let found = worth::Worth::of(&cells);
+        let [salience, smooth] = [found.salience.clone(), smooth_shares(&cells)];
+        let ends = ends(&cells);
+        for x in 0..columns {
+            let there = (x + by) % columns;
+            assert_eq!(ends[there], expected_ends[x], "column {x} turned by {by}");
+            for y in 0..rows {
+                let (at, at_there) = (y * columns + x, y * columns + there);
+                assert!((salience[at_there] - worth[at]).abs() < 1e-5, "({x}, {y}) turned by {by}");
+                assert!((smooth[at_there] - fillable[at]).abs() < 1e-5, "({x}, {y}) turned by {by}");
+            }
+        }
+    }
+}
+
+/// Of all cells the share of the border that is smooth; less than none where nothing may be filled.
+fn smooth_shares(cells: &Cells) -> Vec<f32> {
+    let fillable = smooth::Fillable::of(cells, smooth::Smoothness::CLOUDS, 30);
+    fillable.smooth.into_iter().map(|share| share.unwrap_or(-1.0)).collect()
+}

@@ -1,6 +1,7 @@
 //! What of a panorama matters: what is lost with a cell, and what is broken by cutting between two.
 
 use super::cells::Cells;
+use crate::window::near;
 
 /// Contrast of neighboring cells from which on an edge is a full one, levels: that of a gray stone wall beside a gray sky.
 const FULL_EDGE: f32 = 40.0;
@@ -71,38 +72,39 @@ fn edge(cells: &Cells, at: usize) -> f32 {
         return 0.0;
     }
     let (x, y) = (at % cells.columns, at / cells.columns);
-    let near = [
-        (x > 0).then(|| at - 1),
-        (x + 1 < cells.columns).then_some(at + 1),
-        (y > 0).then(|| at - cells.columns),
-        (y + 1 < cells.rows).then_some(at + cells.columns),
-    ];
-    let contrasts = near.into_iter().flatten().filter(|&other| cells.covered[other]);
+    let beside = near(x, 1, cells.columns, cells.around).map(|x| y * cells.columns + x);
+    let above_and_below = near(y, 1, cells.rows, false).map(|y| y * cells.columns + x);
+    let contrasts = beside.chain(above_and_below).filter(|&other| cells.covered[other]);
     let strongest = contrasts.map(|other| cells.contrast(at, other)).fold(0.0, f32::max);
     (strongest / FULL_EDGE).min(1.0)
 }
 
-/// Means over those cells that are `counted` of a square of `2 * reach + 1` cells around each; 0 without any.
+/// Means over those cells that are `counted` of a square of `2 * reach + 1` cells around each, across the ends of a full turn, too; 0 without
+/// any.
 pub(super) fn box_means(values: &[f32], counted: &[bool], cells: &Cells, reach: usize) -> Vec<f32> {
     let (columns, rows) = (cells.columns, cells.rows);
+    // A full turn is unrolled, so far that no cell counts twice.
+    let lead = if cells.around { reach.min(columns.saturating_sub(1) / 2) } else { 0 };
+    let reach_across = if cells.around { lead } else { reach };
+    let wide = columns + 2 * lead;
     // Sums over all cells above and left of a corner.
-    let mut sums = vec![[0.0_f64; 2]; (columns + 1) * (rows + 1)];
+    let mut sums = vec![[0.0_f64; 2]; (wide + 1) * (rows + 1)];
     for y in 0..rows {
         let mut row = [0.0_f64; 2];
-        for x in 0..columns {
-            let at = y * columns + x;
+        for x in 0..wide {
+            let at = y * columns + (x + columns - lead) % columns;
             if counted[at] {
                 row = [row[0] + f64::from(values[at]), row[1] + 1.0];
             }
-            let above = sums[y * (columns + 1) + x + 1];
-            sums[(y + 1) * (columns + 1) + x + 1] = [above[0] + row[0], above[1] + row[1]];
+            let above = sums[y * (wide + 1) + x + 1];
+            sums[(y + 1) * (wide + 1) + x + 1] = [above[0] + row[0], above[1] + row[1]];
         }
     }
     let mean = |at: usize| {
-        let (x, y) = (at % columns, at / columns);
-        let (left, right) = (x.saturating_sub(reach), (x + reach + 1).min(columns));
+        let (x, y) = (at % columns + lead, at / columns);
+        let (left, right) = (x.saturating_sub(reach_across), (x + reach_across + 1).min(wide));
         let (top, bottom) = (y.saturating_sub(reach), (y + reach + 1).min(rows));
-        let corner = |x: usize, y: usize| sums[y * (columns + 1) + x];
+        let corner = |x: usize, y: usize| sums[y * (wide + 1) + x];
         let [sum, count] = [0, 1]
             .map(|k| corner(right, bottom)[k] - corner(left, bottom)[k] - corner(right, top)[k] + corner(left, top)[k]);
         (sum / count.max(1.0)) as f32
@@ -124,8 +126,7 @@ fn ends(cells: &Cells, salience: &[f32], longer: f64) -> Vec<Option<UpperEnd>> {
     let reach = (SKYLINE * longer).round() as usize;
     let with_prominence = |x: usize| {
         let row = rows[x]?;
-        let mut beside: Vec<usize> =
-            rows[x.saturating_sub(reach)..(x + reach + 1).min(rows.len())].iter().copied().flatten().collect();
+        let mut beside: Vec<usize> = near(x, reach, rows.len(), cells.around).filter_map(|other| rows[other]).collect();
         beside.sort_unstable();
         let prominence = beside[beside.len() / 2].saturating_sub(row);
         Some(UpperEnd { row: row - headroom / 2, top: row, prominence })
