@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
-use super::cells::Cells;
+use super::cells::{Cells, near};
 use super::search::{Best, Worths};
-use super::smooth::{Fillable, Smoothness, near};
+use super::smooth::{Fillable, Smoothness};
 use super::worth::{UpperEnd, Worth};
 use crate::coverage::{Coverage, Rectangle};
 use crate::gaps::FRAME_REACH;

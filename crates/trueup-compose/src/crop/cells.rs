@@ -114,11 +114,51 @@ impl Cells {
         Ok(Self { side, columns, rows, covered, colors, deviations, around })
     }
 
+    /// The same, where covered cells of which nothing `is_seen` are as those beside them are in the mean, step by step from what is seen.
+    pub(super) fn with_unseen(mut self, mut is_seen: Vec<bool>) -> Self {
+        let mut unseen: Vec<usize> = (0..is_seen.len()).filter(|&at| self.covered[at] && !is_seen[at]).collect();
+        while !unseen.is_empty() {
+            let is_next = |at: &usize| near(&self, *at).any(|other| is_seen[other]);
+            let (next, rest): (Vec<usize>, Vec<usize>) = unseen.into_iter().partition(is_next);
+            let mean = |&at: &usize| {
+                let (mut color, mut deviation, mut count) = ([0.0_f32; 3], 0.0, 0.0_f32);
+                for other in near(&self, at).filter(|&other| is_seen[other]) {
+                    color.iter_mut().zip(self.colors[other]).for_each(|(sum, level)| *sum += level);
+                    deviation += self.deviations[other];
+                    count += 1.0;
+                }
+                (color.map(|sum| sum / count.max(1.0)), deviation / count.max(1.0))
+            };
+            let means: Vec<([f32; 3], f32)> = next.iter().map(mean).collect();
+            for (&at, (color, deviation)) in next.iter().zip(means) {
+                (self.colors[at], self.deviations[at], is_seen[at]) = (color, deviation, true);
+            }
+            // Beside nothing that is seen.
+            unseen = if next.is_empty() { Vec::new() } else { rest };
+        }
+        self
+    }
+
     /// The largest difference of a channel between two cells, levels.
     pub(super) fn contrast(&self, a: usize, b: usize) -> f32 {
         let (a, b) = (self.colors[a], self.colors[b]);
         (0..3).map(|channel| (a[channel] - b[channel]).abs()).fold(0.0, f32::max)
     }
+}
+
+/// The cells around one, across the ends of a full turn, too.
+pub(super) fn near(cells: &Cells, at: usize) -> impl Iterator<Item = usize> {
+    let (columns, rows, around) = (cells.columns, cells.rows, cells.around);
+    let (x, y) = (at % columns, at / columns);
+    let beside = move |step: usize| {
+        // 0, 1, 2: left, here, right.
+        match (x + step).checked_sub(1) {
+            Some(other) if other < columns => Some(other),
+            _ if around => Some((x + step + columns - 1) % columns),
+            _ => None,
+        }
+    };
+    (y.saturating_sub(1)..(y + 2).min(rows)).flat_map(move |v| (0..3).filter_map(beside).map(move |u| v * columns + u))
 }
 
 impl Sums {

@@ -91,7 +91,7 @@ impl CutCells {
     }
 
     /// The cells as they will be when blending makes these `changes` of [`Self::places`]. Steps at seams, which blending takes
-    /// away, count as no deviation.
+    /// away, count as no deviation. Cells between the pixels of the small views, as narrow ones at the canvas's end may be, are like those beside them.
     pub(crate) fn blended(self, changes: &[[f32; 3]], encoding: &Encoding) -> Cells {
         const WHITE: f32 = 255.0;
         let CellGrid { side, columns, rows, .. } = self.ahead.grid;
@@ -114,6 +114,7 @@ impl CutCells {
         }
         let deviations = variances.into_iter().map(f32::sqrt).collect();
         let CellsAhead { covered, around, .. } = self.ahead;
-        Cells { side, columns, rows, covered, colors, deviations, around }
+        let is_seen = pixels.into_iter().map(|pixels| pixels > 0.0).collect();
+        Cells { side, columns, rows, covered, colors, deviations, around }.with_unseen(is_seen)
     }
 }

@@ -1,6 +1,6 @@
 //! Which empty cells may be filled: those beside which the picture is so smooth that a smooth surface goes on as it would.
 
-use super::cells::Cells;
+use super::cells::{Cells, near};
 use super::worth::box_means;
 
 /// What counts as smooth.
@@ -74,21 +74,6 @@ impl Fillable {
             .map(|(smooth, &covered)| smooth.filter(|&share| !covered && share >= LEAST_SMOOTH));
         Self { smooth: fillable.collect() }
     }
-}
-
-/// The cells around one, across the ends of a full turn, too.
-pub(super) fn near(cells: &Cells, at: usize) -> impl Iterator<Item = usize> {
-    let (columns, rows, around) = (cells.columns, cells.rows, cells.around);
-    let (x, y) = (at % columns, at / columns);
-    let beside = move |step: usize| {
-        // 0, 1, 2: left, here, right.
-        match (x + step).checked_sub(1) {
-            Some(other) if other < columns => Some(other),
-            _ if around => Some((x + step + columns - 1) % columns),
-            _ => None,
-        }
-    };
-    (y.saturating_sub(1)..(y + 2).min(rows)).flat_map(move |v| (0..3).filter_map(beside).map(move |u| v * columns + u))
 }
 
 /// Whether a covered cell beside an empty one, and what is covered around it, is smooth; `None` for all other cells.

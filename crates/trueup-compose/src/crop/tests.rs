@@ -321,3 +321,26 @@ fn smooth_shares(cells: &Cells) -> Vec<f32> {
     let fillable = smooth::Fillable::of(cells, smooth::Smoothness::CLOUDS, 30);
     fillable.smooth.into_iter().map(|share| share.unwrap_or(-1.0)).collect()
 }
+
+/// The last column of cells is a pixel wide, in which no middle of a pixel of the small views lies.
+#[test]
+fn cells_between_the_pixels_of_small_views_are_like_those_beside_them() {
+    use crate::seam::Seams;
+    use crate::small_views::{PARTLY, SmallView, WHOLLY};
+    use crate::transfer_curve::Encoding;
+
+    let layout = layout(1501, 1001, &[upright(0.0, 0.0, 1501.0, 1001.0); 2]);
+    let (small, level) = ([750, 500], 120);
+    let ahead = CellsAhead::new(&layout, &Coverage::of(&layout), small).expect("fine enough");
+    let pixels = vec![[level, level, level, PARTLY | WHOLLY]; small[0] * small[1]];
+    let view = SmallView { columns: 0..small[0], rows: 0..small[1], pixels };
+    let cut = ahead.cut(&[view], &[Vec::new()], &Seams::of_one(small[0], small[1]));
+    let changes = vec![[0.0; 3]; cut.places().len()];
+    let cells = cut.blended(&changes, &Encoding::new(trueup_core::color::TransferCurve::SRGB, 1.0));
+    assert!(cells.covered.iter().all(|&covered| covered));
+    let first = cells.colors[0];
+    assert!(first[0] > 100.0);
+    for (at, color) in cells.colors.iter().enumerate() {
+        assert!((color[0] - first[0]).abs() < 1e-3, "cell ({}, {})", at % cells.columns, at / cells.columns);
+    }
+}
