@@ -272,7 +272,7 @@ fn turned(by: usize) -> Cells {
     const SIZE: [usize; 2] = [90, 60];
     let [columns, rows] = SIZE;
     let place = |at: usize| ((at % columns + columns - by) % columns, at / columns);
-    let is_covered = |(x, y): (usize, usize)| y >= 3 && !((x < 6 || x >= 76) && (40..52).contains(&y));
+    let is_covered = |(x, y): (usize, usize)| y >= 3 && ((6..76).contains(&x) || !(40..52).contains(&y));
     let level = |(x, y): (usize, usize)| match (y > 20 + x * 7 % 13, (x + 3) % columns < 6 && y > 12) {
         (true, _) => 40.0 + f32::from(rough(x, y)) / 2.0,
         (false, true) => 70.0,
@@ -304,9 +304,9 @@ fn a_full_turn_is_judged_alike_wherever_it_is_cut() {
         let found = worth::Worth::of(&cells);
         let [salience, smooth] = [found.salience.clone(), smooth_shares(&cells)];
         let ends = ends(&cells);
-        for x in 0..columns {
+        for (x, expected_end) in expected_ends.iter().enumerate() {
             let there = (x + by) % columns;
-            assert_eq!(ends[there], expected_ends[x], "column {x} turned by {by}");
+            assert_eq!(ends[there], *expected_end, "column {x} turned by {by}");
             for y in 0..rows {
                 let (at, at_there) = (y * columns + x, y * columns + there);
                 assert!((salience[at_there] - worth[at]).abs() < 1e-5, "({x}, {y}) turned by {by}");
