@@ -62,9 +62,7 @@ impl From<Error> for Failure {
             Error::Unsupported { what, hint } => Self::usage(format!("{what} is not supported"), hint),
             Error::Unsolvable { stage, subject, why, hint } => failed(format!("{stage}: {subject}: {why}"), hint),
             Error::NotApplicable { method, reason, hint } => {
-                // An option as it is set says by itself what it is.
-                let what = if method.contains('=') { method } else { format!("the method {method}") };
-                failed(format!("{what} is not applicable: {reason}"), hint)
+                failed(format!("{} is not applicable: {reason}", Error::named_choice(&method)), hint)
             }
             Error::Cancelled => Self { status: status_of_stopping(), ..failed(error.to_string(), String::new()) },
             other => failed(other.to_string(), String::new()),

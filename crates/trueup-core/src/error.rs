@@ -58,10 +58,11 @@ pub enum Error {
         /// What the user can do about it, a whole sentence.
         hint: String,
     },
-    /// The method that was chosen cannot make a panorama of these photographs; another one can.
-    #[error("the method {method} is not applicable: {reason}. {hint}")]
+    /// The method, or another choice, that was made cannot make a panorama of these photographs; another one can.
+    #[error("{} is not applicable: {reason}. {hint}", Error::named_choice(.method))]
     NotApplicable {
-        /// The method, as in the options.
+        /// The method, as in the options, or an option as it is set, `table.option = value`. Messages name it by
+        /// [`Error::named_choice`].
         method: String,
         /// Which photograph it cannot place and why, with the angle where the field of view is at fault, without a closing
         /// full stop.
@@ -100,6 +101,12 @@ impl Error {
         Self::NotApplicable { method: method.to_string(), reason: reason.to_string(), hint: hint.to_string() }
     }
 
+    /// What an [`Error::NotApplicable`] says of its `method` in a sentence: an option as it is set says by itself what it is, a method's
+    /// name alone does not.
+    pub fn named_choice(method: &str) -> String {
+        if method.contains('=') { method.to_owned() } else { format!("the method {method}") }
+    }
+
     /// An [`Error::Io`] for `path`: `action` is what was being done, e.g. "reading".
     pub fn io(action: &'static str, path: &Path, source: std::io::Error) -> Self {
         Self::Io { action, path: path.to_owned(), source }
@@ -109,4 +116,19 @@ impl Error {
 fn list_invalid(invalid: &[InvalidOption]) -> String {
     let lines: Vec<String> = invalid.iter().map(ToString::to_string).collect();
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_option_that_is_not_applicable_is_not_called_a_method() {
+        let text = |choice: &str| Error::not_applicable(choice, "it is one photograph", "Give two.").to_string();
+        assert_eq!(text("sphp"), "the method sphp is not applicable: it is one photograph. Give two.");
+        assert_eq!(
+            text("projection.kind = panini"),
+            "projection.kind = panini is not applicable: it is one photograph. Give two."
+        );
+    }
 }

@@ -62,8 +62,7 @@ impl From<Error> for Trouble {
             Error::Unsupported { what, hint } => trouble(format!("{what} is not supported"), hint),
             Error::Unsolvable { subject, why, hint, .. } => trouble(format!("{subject}: {why}"), hint),
             Error::NotApplicable { method, reason, hint } => {
-                let what = if method.contains('=') { method } else { format!("the method {method}") };
-                trouble(format!("{what} cannot be used here: {reason}"), hint)
+                trouble(format!("{} cannot be used here: {reason}", Error::named_choice(&method)), hint)
             }
             other => trouble(other.to_string(), String::new()),
         }
