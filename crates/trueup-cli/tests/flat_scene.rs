@@ -103,6 +103,12 @@ fn a_wall_is_drawn_as_it_lies_and_can_be_composed_again() {
     let bytes = |file: &str| std::fs::read(desk.join(file)).expect("written");
     assert!(bytes("wall.png") == bytes("again.png"), "composed again, it is another");
 
+    // There is no view to turn, which is said.
+    let turned = finish(trueup(desk.path(), &["compose", "wall.json", "-o", "turned.png", "--yaw", "20", "--quiet"]));
+    assert_eq!((turned.status, turned.stdout.as_str()), (0, ""));
+    assert!(turned.stderr.contains("projection.yaw = 20: the photographs show a flat scene"), "{}", turned.stderr);
+    assert!(bytes("wall.png") == bytes("turned.png"), "it is turned");
+
     let other =
         finish(trueup(desk.path(), &["compose", "wall.json", "-o", "other.png", "--projection", "cylindrical"]));
     other.expect_failure(1, &["projection.kind = cylindrical", "flat scene", "cameras.scene = rotating"]);

@@ -198,21 +198,18 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, memo: Memo, context: &StageC
         _ => options.projection.clone(),
     };
     let wanted = asked.kind;
+    let missing = match (is_flat_scene, cameras.is_none()) {
+        (true, _) => MissingView::FLAT_SCENE,
+        (false, true) => MissingView::NO_CAMERAS,
+        (false, false) => MissingView::MESH,
+    };
     let Some(cameras) = cameras.filter(|_| wanted != Projection::Mesh) else {
         if !matches!(wanted, Projection::Mesh | Projection::Auto) {
-            let (reason, hint) = match is_flat_scene {
-                true => (
-                    "the photographs show a flat scene from many places, and are drawn as they lie in its plane",
-                    "Leave the projection to auto, or stitch with cameras.scene = rotating.",
-                ),
-                false => (
-                    "no cameras are known: there is one photograph alone, or its record lacks them",
-                    "Stitch at least two overlapping photographs, or leave out --projection.",
-                ),
-            };
             let option = format!("projection.kind = {}", trueup_core::options::OptionValue::display(&wanted));
-            return Err(Error::not_applicable(option, reason, hint));
+            let hint = format!("Leave projection.kind to auto, or {}.", missing.remedy);
+            return Err(Error::not_applicable(option, missing.reason, hint));
         }
+        missing.report(&asked, context);
         return Ok(Arrangement::of_mesh(plane));
     };
     let photographs: Vec<PosedPhotograph> = cameras
@@ -237,6 +234,45 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, memo: Memo, context: &StageC
     report_cut(&plane, &drawn, &view, options, context);
     let projection = Some(ProjectionRecord::new(&view, &drawn));
     Ok(Arrangement { delivered: scene.delivered(&drawn), plane, drawn, projection, by_cameras })
+}
+
+/// Why a panorama has no view that could be turned or bounded.
+struct MissingView {
+    /// Without a closing full stop.
+    reason: &'static str,
+    /// What gives it a view, the rest of a sentence.
+    remedy: &'static str,
+}
+
+impl MissingView {
+    const FLAT_SCENE: Self = Self {
+        reason: "the photographs show a flat scene from many places, and are drawn as they lie in its plane",
+        remedy: "stitch with cameras.scene = rotating",
+    };
+    const NO_CAMERAS: Self = Self {
+        reason: "no cameras are known: there is one photograph alone, or its record lacks them",
+        remedy: "stitch at least two overlapping photographs",
+    };
+    const MESH: Self = Self {
+        reason: "the panorama is drawn on the mesh, as it lies",
+        remedy: "choose another projection.kind than the mesh, where the method has others",
+    };
+
+    /// Says what was `asked` of a view and is not heeded; 0 asks for nothing.
+    fn report(&self, asked: &ProjectionOptions, context: &StageContext) {
+        let ProjectionOptions { yaw, pitch, roll, fov, .. } = *asked;
+        let idle: Vec<String> = [("yaw", yaw), ("pitch", pitch), ("roll", roll), ("fov", fov)]
+            .into_iter()
+            .filter(|(_, value)| *value != 0.0)
+            .map(|(name, value)| format!("projection.{name} = {value}"))
+            .collect();
+        if idle.is_empty() {
+            return;
+        }
+        let message = format!("nothing is turned or bounded by {}: {}", idle.join(", "), self.reason);
+        let hint = format!("Leave it out, or {}.", self.remedy);
+        context.report(Diagnostic::warning("view-not-heeded", Subject::Stage("projection".into()), message, hint));
+    }
 }
 
 /// Photographs on the mesh's plane, and its turn if it closes on itself.
@@ -406,7 +442,15 @@ mod tests {
         let refused = run(input(None), &options, Memo::default(), &StageContext::default()).expect_err("no camera");
         assert!(matches!(refused, Error::NotApplicable { .. }), "{refused}");
         options.projection.kind = Projection::Auto;
-        let kept = run(input(None), &options, Memo::default(), &StageContext::default()).expect("as it is").value;
+        let kept = run(input(None), &options, Memo::default(), &StageContext::default()).expect("as it is");
+        assert_eq!(kept.findings, []);
+        let kept = kept.value;
         assert_eq!((kept.drawn.width, kept.drawn.height, kept.projection), (40, 30, None));
+        // What turns a view is not passed over in silence.
+        (options.projection.yaw, options.projection.fov) = (20.0, 60.5);
+        let told = run(input(None), &options, Memo::default(), &StageContext::default()).expect("as it is").findings;
+        assert_eq!(told.iter().map(|one| one.code.as_str()).collect::<Vec<_>>(), ["view-not-heeded"]);
+        let start = "nothing is turned or bounded by projection.yaw = 20, projection.fov = 60.5: no cameras are known";
+        assert!(told[0].message.starts_with(start), "{}", told[0].message);
     }
 }

@@ -173,7 +173,7 @@ pub(crate) fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<P
 }
 
 /// What is found on the way from the geometry to the panorama, each time anew.
-const FOUND_IN_COMPOSING: [&str; 11] = [
+const FOUND_IN_COMPOSING: [&str; 12] = [
     "canvas-reduced",
     "color-converted",
     "color-profile-damaged",
@@ -185,6 +185,7 @@ const FOUND_IN_COMPOSING: [&str; 11] = [
     "photograph-replaced",
     "projection-cut",
     "projection-left-out",
+    "view-not-heeded",
 ];
 
 /// Brings the record up to what is composed of the photographs of `set`, which stand at the positions `used`.
