@@ -27,7 +27,7 @@ fn all_measures_are_printed() {
         "  GDIC-P    ",
         "  alignment ",
         "  stated    ",
-        "c.jpg: leans by ",
+        "c.jpg: leans ",
         " degrees off upright, theta ",
         "pixels      ",
         "  NCC       RMSE ",

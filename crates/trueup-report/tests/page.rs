@@ -84,6 +84,10 @@ fn the_page_says_what_the_project_says_and_runs_nothing() {
         assert!(address.starts_with("data:image/jpeg;base64,") || address.starts_with('#'), "{address:.60}");
     }
     assert!(page.contains("mesh.cell_px") && page.contains("45.0"), "options that differ are listed");
+    for (start, _) in page.match_indices("<figcaption") {
+        let told = page[start..].split_once("</figcaption>").expect("its end").0;
+        assert!(!told.contains(">-"), "sizes have a side instead of a sign: {told}");
+    }
     assert_eq!(page.matches("<img ").count(), 3);
     assert_eq!(
         page.matches("role=\"img\"").count(),

@@ -55,7 +55,7 @@ pub use report::evaluation::{
 pub use report::judgement::{Judgement, Verdict};
 pub use report::measures::{
     BentLine, FEWEST_CERTAIN, LongLines, MeasuredLine, Measures, PairMeasures, PhotographMeasures, PlaceMeasures,
-    ReprojectionMeasures, UprightMeasures, WorstPair,
+    ReprojectionMeasures, UprightMeasures, WorstPair, lean_side,
 };
 pub use report::shown::ShownPhotographs;
 pub use trueup_align::cameras::{CameraOptions, FlatEvidence, LensKind, SceneModel};

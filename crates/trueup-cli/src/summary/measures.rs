@@ -1,6 +1,6 @@
 //! What the panorama's own lines and matches say of it.
 
-use trueup::{FEWEST_CERTAIN, Judgement, Measures, PhotographMeasures, Project};
+use trueup::{FEWEST_CERTAIN, Judgement, Measures, PhotographMeasures, Project, lean_side};
 
 use super::labeled_lines::LabeledLines;
 use super::names::{listed, name_of};
@@ -110,20 +110,23 @@ pub(super) fn table(lines: &mut LabeledLines, project: &Project, names: &[String
     }
 }
 
-/// "leans by 0.02 +- 0.29 degrees at 95 % (34 vertical lines)"
+/// "leans to the left by 0.02 +- 0.29 degrees at 95 % (34 vertical lines)"
 fn lean(photograph: &PhotographMeasures) -> String {
+    /// Decimals of degrees that are told of a photograph.
+    const DECIMALS: usize = 2;
     let lines = match photograph.vertical_lines {
         0 => "no vertical lines".to_owned(),
         1 => "1 vertical line".to_owned(),
         count => format!("{count} vertical lines"),
     };
     let uncertain = if photograph.certain { "" } else { "uncertain: " };
-    match (photograph.lean_deg, photograph.within_deg) {
-        (Some(lean), Some(within)) => {
-            format!("{uncertain}leans by {lean:.2} +- {within:.2} degrees at 95 % ({lines})")
+    let Some(lean) = photograph.lean_deg else { return lines };
+    let (side, size) = (lean_side(lean, DECIMALS), lean.abs());
+    match photograph.within_deg {
+        Some(within) => {
+            format!("{uncertain}leans{side} by {size:.DECIMALS$} +- {within:.DECIMALS$} degrees at 95 % ({lines})")
         }
         // A project of an earlier version states no interval.
-        (Some(lean), None) => format!("{uncertain}leans by {lean:.2} degrees ({lines})"),
-        (None, _) => lines,
+        None => format!("{uncertain}leans{side} by {size:.DECIMALS$} degrees ({lines})"),
     }
 }

@@ -131,8 +131,20 @@ time ";
     let printed = text(&project, Some(&file), false);
     assert!(printed.contains(short), "{printed}");
     let long = text(&project, None, false);
-    assert!(long.contains("a.jpg: leans by 0.61 +- 0.09 degrees at 95 % (34 vertical lines)"), "{long}");
-    assert!(long.contains("b.jpg: uncertain: leans by"), "{long}");
+    assert!(long.contains("a.jpg: leans to the right by 0.61 +- 0.09 degrees at 95 % (34 vertical lines)"), "{long}");
+    assert!(long.contains("b.jpg: uncertain: leans to the right by"), "{long}");
+}
+
+#[test]
+fn a_lean_has_a_side_instead_of_a_sign() {
+    let photograph = |path: &str, lean: f64| {
+        serde_json::json!({"path": path, "vertical_lines": 1, "lean_deg": lean, "standard_error_deg": 0.04,
+                           "within_deg": 0.09, "gamma_deg": 1.0, "certain": true})
+    };
+    let photographs = serde_json::json!([photograph("x/a.jpg", -0.02), photograph("x/b.jpg", -0.004)]);
+    let long = text(&measured(serde_json::Value::Null, photographs, serde_json::Value::Null), None, false);
+    assert!(long.contains("a.jpg: leans to the left by 0.02 +- 0.09 degrees at 95 % (1 vertical line)"), "{long}");
+    assert!(long.contains("b.jpg: leans by 0.00 +- 0.09 degrees at 95 % (1 vertical line)"), "{long}");
 }
 
 #[test]

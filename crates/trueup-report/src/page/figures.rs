@@ -12,6 +12,11 @@ pub(super) fn figure(field: &str, value: f64, decimals: usize) -> Value {
     json!({ "field": field, "value": value.to_string(), "shown": format!("{value:.decimals$}") })
 }
 
+/// The size of a figure of the project, whose sign is told by words beside it.
+pub(super) fn size(field: &str, value: f64, decimals: usize) -> Value {
+    json!({ "field": field, "value": value.to_string(), "shown": format!("{:.decimals$}", value.abs()) })
+}
+
 /// A count of the project.
 pub(super) fn count(field: &str, value: usize) -> Value {
     json!({ "field": field, "value": value.to_string(), "shown": value.to_string() })

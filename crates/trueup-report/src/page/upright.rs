@@ -1,9 +1,9 @@
 //! Why the panorama stands as it does: vanishing points, leans, and every photograph with its lines.
 
 use serde_json::{Value, json};
-use trueup::{ImageRecord, LineGuide, PhotographMeasures, Project};
+use trueup::{ImageRecord, LineGuide, PhotographMeasures, Project, lean_side};
 
-use super::figures::{along, chart, count, figure, reaching_down};
+use super::figures::{along, chart, count, figure, reaching_down, size};
 use super::{Page, picture};
 use crate::charts::{Chart, Point, Series, SeriesMark};
 use crate::drawings;
@@ -87,6 +87,8 @@ pub(super) fn photographs(page: &Page) -> Vec<Value> {
 }
 
 fn photograph(page: &Page, position: usize) -> Value {
+    /// Decimals of degrees that are told.
+    const DECIMALS: usize = 2;
     let image: &ImageRecord = &page.project.images[position];
     let measures = page.project.measures.as_ref().map(|measures| &measures.photographs);
     let index = measures.and_then(|all| all.iter().position(|one| one.path == image.path));
@@ -96,20 +98,20 @@ fn photograph(page: &Page, position: usize) -> Value {
     };
     let of_measures = |name: &str, value: fn(&PhotographMeasures) -> Option<f64>| {
         let (index, one) = measured?;
-        Some(figure(&format!("/measures/pictures/{index}/{name}"), value(one)?, 2))
+        Some(figure(&format!("/measures/pictures/{index}/{name}"), value(one)?, DECIMALS))
     };
     let lines =
         measured.map(|(index, one)| count(&format!("/measures/pictures/{index}/vertical_lines"), one.vertical_lines));
-    let lean = measured.and_then(|(_, one)| one.lean_deg);
+    let lean = measured.and_then(|(index, one)| Some((index, one.lean_deg.filter(|_| one.within_deg.is_some())?)));
     json!({
         "name": page.named(position),
         "color": photograph_color(position),
         "is_reference": image.path == page.project.reference,
         "picture": page.pictures.photographs.get(&position).map(picture),
         "lines": drawings::lines_of_photograph(page.project, position).unwrap_or_default(),
-        "lean": of_measures("lean_deg", |one| one.lean_deg.filter(|_| one.within_deg.is_some())),
+        "lean": lean.map(|(index, degrees)| size(&format!("/measures/pictures/{index}/lean_deg"), degrees, DECIMALS)),
         "within": of_measures("within_deg", |one| one.within_deg),
-        "side": if lean.is_some_and(|lean| lean < 0.0) { "to the left" } else { "to the right" },
+        "side": lean.map_or("", |(_, degrees)| lean_side(degrees, DECIMALS)),
         "certain": measured.is_some_and(|(_, one)| one.certain),
         "vertical_lines": lines,
         "theta": of_image("theta_deg", image.theta_deg, 1),

@@ -7,7 +7,7 @@ use trueup_align::metrics::BENT_SHARE;
 use trueup_align::projection::FlatKind;
 use trueup_core::diagnostics::{Diagnostic, Subject};
 
-use super::measures::Measures;
+use super::measures::{Measures, lean_side};
 use crate::options::Evidence;
 use crate::pipeline::align::PARALLAX;
 use crate::project::record::Project;
@@ -134,11 +134,16 @@ fn leaning(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Optio
         Some((one, lean, lean.abs() + one.within_deg.unwrap_or(0.0)))
     });
     let (photograph, lean, within) = widest.max_by(|one, two| one.2.total_cmp(&two.2))?;
-    let side = if lean < 0.0 { "left" } else { "right" };
+    /// Decimals of degrees that are told.
+    const DECIMALS: usize = 1;
+    let side = lean_side(lean, DECIMALS);
     Some(Diagnostic::warning(
         LEANING,
         Subject::Photograph(place(&photograph.path)?),
-        format!("what is vertical there leans to the {side} by {:.1} degrees, up to {within:.1} at 95 %", lean.abs()),
+        format!(
+            "what is vertical there leans{side} by {:.DECIMALS$} degrees, up to {within:.DECIMALS$} at 95 %",
+            lean.abs()
+        ),
         "Look at it there. If it does lean, try --projection auto, or --roll with it.",
     ))
 }

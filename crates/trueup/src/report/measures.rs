@@ -9,6 +9,17 @@ pub(crate) const HUNDREDTHS: f64 = 100.0;
 /// Photographs whose lean is certain that a panorama needs for an uprightness of its own: fewer have none in common.
 pub const FEWEST_CERTAIN: usize = 2;
 
+/// Which way something leans that leans clockwise by `lean_deg` degrees, as words to follow "leans": " to the left" or " to the right".
+/// Empty where the size is zero as it is shown, with so many `decimals`.
+pub fn lean_side(lean_deg: f64, decimals: usize) -> &'static str {
+    let shown = format!("{:.decimals$}", lean_deg.abs());
+    match shown.parse() == Ok(0.0) {
+        true => "",
+        false if lean_deg < 0.0 => " to the left",
+        false => " to the right",
+    }
+}
+
 /// Measures of a panorama that need no truth. Angles in degrees, positive clockwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
@@ -188,4 +199,18 @@ pub struct PhotographMeasures {
     /// Its long lines. Empty in projects of earlier versions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lines: Vec<MeasuredLine>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_rounds_to_zero_leans_to_no_side() {
+        for (degrees, decimals, side) in
+            [(-0.02, 2, " to the left"), (0.02, 2, " to the right"), (-0.02, 1, ""), (-0.0, 2, ""), (0.004, 2, "")]
+        {
+            assert_eq!(lean_side(degrees, decimals), side, "{degrees} with {decimals} decimals");
+        }
+    }
 }
