@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
-use trueup::{Error, Outputs, Project, ReadFile, StageContext, Written};
+use trueup::{Error, Outputs, Project, ReadFile, RunOptions, StageContext, Written};
 use trueup_report::ReportJob;
 
 use crate::arguments::ReportArgs;
@@ -25,6 +25,8 @@ pub(crate) fn run(args: &ReportArgs) -> Result<(), Failure> {
         project,
         project_folder: args.project.parent().unwrap_or(Path::new("")).to_owned(),
         photographs: args.photos.clone(),
+        // Another machine may have stitched, which has other memory and other folders.
+        run: RunOptions::default(),
         threads: args.threads.map_or(0, usize::from),
     };
     let page = progress::shown(args.quiet, |context| job.run(context))?;
@@ -80,6 +82,8 @@ impl ReportBeside {
             project: project.clone(),
             project_folder: PathBuf::new(),
             photographs: None,
+            // As was asked for the panorama, here and now.
+            run: project.options.run.clone(),
             threads: self.threads,
         };
         job.run(context)

@@ -23,7 +23,7 @@ const LEAST_SCALE: f64 = 1e-4;
 /// Which panorama to report of.
 ///
 /// ```
-/// use trueup::{Inputs, Outputs, StageContext, StitchJob, StitchOptions};
+/// use trueup::{Inputs, Outputs, RunOptions, StageContext, StitchJob, StitchOptions};
 /// use trueup_report::ReportJob;
 /// # let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
 /// # let desk = tempfile::tempdir()?;
@@ -34,7 +34,7 @@ const LEAST_SCALE: f64 = 1e-4;
 /// # let job = StitchJob { inputs: Inputs::new([room]), outputs, cache: None, threads: 0 };
 /// let project = job.run(&options, &context)?.remove(0).project;
 /// let folder = desk.path().to_owned();
-/// let job = ReportJob { name: "room".to_owned(), project, project_folder: folder, photographs: None, threads: 0 };
+/// let job = ReportJob { name: "room".to_owned(), project, project_folder: folder, photographs: None, run: RunOptions::default(), threads: 0 };
 /// let page = job.run(&context)?;
 /// assert!(page.starts_with("<!DOCTYPE html>") && !page.contains("<script"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -49,6 +49,8 @@ pub struct ReportJob {
     pub project_folder: PathBuf,
     /// A folder that holds the photographs, if they moved.
     pub photographs: Option<PathBuf>,
+    /// What the work may take of this machine. Those that the project records are of the machine that stitched.
+    pub run: RunOptions,
     /// Number of threads; 0 for one per core.
     pub threads: usize,
 }
@@ -64,7 +66,7 @@ impl ReportJob {
     }
 
     fn page(&self, context: &StageContext) -> Result<String> {
-        let options = small(&self.project);
+        let options = StitchOptions { run: self.run.clone(), ..small(&self.project) };
         let stitcher = Stitcher::new(&options, context);
         let recorded = RecordedPanorama {
             project: &self.project,
@@ -102,8 +104,6 @@ fn small(project: &Project) -> StitchOptions {
     let longer = project.canvas.width.max(project.canvas.height) as f64;
     let smaller = (PANORAMA_PX / longer).min(1.0);
     options.arrange.canvas.scale = (options.arrange.canvas.scale * smaller).max(LEAST_SCALE);
-    // Another machine has other memory and other folders.
-    options.run = RunOptions::default();
     options
 }
 

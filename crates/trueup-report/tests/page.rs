@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use trueup::{Inputs, Outputs, Project, StageContext, StitchJob, StitchOptions};
+use trueup::{Inputs, Outputs, Project, RunOptions, StageContext, StitchJob, StitchOptions};
 use trueup_report::{ReportJob, drawings};
 
 /// A name that would end every element and attribute that it stands in.
@@ -36,6 +36,7 @@ fn page(name: &str, project: &Project) -> String {
         project: project.clone(),
         project_folder: PathBuf::new(),
         photographs: None,
+        run: RunOptions::default(),
         threads: 1,
     };
     job.run(&StageContext::default()).expect("a page")
@@ -83,17 +84,38 @@ fn the_page_says_what_the_project_says_and_runs_nothing() {
     for address in loading.filter_map(|rest| rest.split('"').next()).filter(|one| !one.starts_with("<!DOCTYPE")) {
         assert!(address.starts_with("data:image/jpeg;base64,") || address.starts_with('#'), "{address:.60}");
     }
-    assert!(page.contains("mesh.cell_px") && page.contains("45.0"), "options that differ are listed");
     for (start, _) in page.match_indices("<figcaption") {
         let told = page[start..].split_once("</figcaption>").expect("its end").0;
         assert!(!told.contains(">-"), "sizes have a side instead of a sign: {told}");
     }
+    assert!(page.contains("mesh.cell_px") && page.contains("45.0"), "options that differ are listed");
     assert_eq!(page.matches("<img ").count(), 3);
     assert_eq!(
         page.matches("role=\"img\"").count(),
         page.matches("role=\"img\" aria-label=\"").count(),
         "each is told"
     );
+}
+
+/// What was recorded of the machine that stitched does not count; what this one is asked to do with does.
+#[test]
+fn a_page_keeps_to_the_memory_it_is_given() {
+    let desk = tempfile::tempdir().expect("a folder");
+    let mut project = stitched(desk.path());
+    let mut options = StitchOptions::default();
+    options.set("resources.memory=1MB").expect("an option");
+    let job = |project: &Project, run: RunOptions| ReportJob {
+        name: "pano".to_owned(),
+        project: project.clone(),
+        project_folder: PathBuf::new(),
+        photographs: None,
+        run,
+        threads: 1,
+    };
+    let refused = job(&project, options.run.clone()).run(&StageContext::default()).expect_err("too little");
+    assert!(refused.to_string().contains("memory"), "{refused}");
+    project.options.run = options.run;
+    job(&project, RunOptions::default()).run(&StageContext::default()).expect("a page");
 }
 
 /// The heat map and the lines are those that the figures were taken of.
