@@ -71,7 +71,7 @@ pub(crate) struct BatchArgs {
     #[arg(long, conflicts_with = "quiet", help_heading = "Messages")]
     pub json: bool,
 
-    /// Print nothing but errors
+    /// Print nothing but errors and warnings, each in one line on standard error
     #[arg(short, long, help_heading = "Messages")]
     pub quiet: bool,
 }

@@ -85,7 +85,12 @@ mod tests {
         let failed = SetRecord { outcome: failed, outdated, ..record.clone() };
         let page = text(&[record.clone(), failed], 2).expect("a page");
         assert!(page.contains("old%20%231.jpg") && page.contains("earlier attempt"), "{page}");
-        assert!(!text(&[record], 1).expect("a page").contains("earlier attempt"));
+        let one = text(&[record], 1).expect("a page");
+        assert!(
+            !one.contains("earlier attempt") && one.contains("1 panorama of 1 set of photographs; 1 set was found"),
+            "{one}"
+        );
+        assert!(page.contains("1 panorama of 2 sets of photographs; 2 sets were found"), "{page}");
         assert!(!page.contains("<script") && !page.contains("<b>"), "{page}");
         assert_eq!(address(&"a b/#1?.jpg".into()), "./a%20b/%231%3F.jpg");
         assert!(page.contains("a%20b") && page.contains("%231%3F.jpg"), "{page}");

@@ -141,6 +141,11 @@ impl SetRecord {
         self.panoramas().iter().all(all_are)
     }
 
+    /// Whether the photograph at this position of the set could not be read then.
+    pub(super) fn was_unreadable(&self, position: usize) -> bool {
+        self.made_of[PHOTOGRAPHS].get(position).is_some_and(|photograph| photograph.get(UNREADABLE).is_some())
+    }
+
     /// Whether what is `made_of` now would come to nothing else than the record's. A photograph that could be read then and cannot
     /// now would only be missing; one that could not be read then and can now is made use of.
     pub(super) fn is_of(&self, made_of: &Value) -> bool {
@@ -275,6 +280,8 @@ mod tests {
             false => json!({"path": "x.jpg", "bytes": bytes}),
         };
         let made_of = |one: Value| json!({"options": ["a=1"], PHOTOGRAPHS: [one]});
+        let before = made(made_of(photograph(5, true)), Value::Null);
+        assert_eq!([0, 1].map(|position| before.was_unreadable(position)), [true, false]);
         let is_same = |before: Value, now: Value| made(made_of(before), Value::Null).is_of(&made_of(now));
         assert!(is_same(photograph(5, false), photograph(5, false)));
         assert!(!is_same(photograph(5, false), photograph(6, false)));

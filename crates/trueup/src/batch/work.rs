@@ -107,15 +107,14 @@ impl<'a> Work<'a> {
     /// [`Error::Cancelled`], and [`Error::Io`] where no set could be kept.
     pub(super) fn attempt(&self, position: usize, context: &StageContext) -> Result<Attempt> {
         let set = &self.batch.sets[position];
-        let made_of = self.made_of(set);
         let outcome = match self.refusal(set) {
             Some(refusal) => SetOutcome::failed(&refusal),
-            None => match self.attempt_in_folder(position, &made_of, context) {
+            None => match self.attempt_in_folder(position, context) {
                 Err(error) if !concerns_all(&error) => unkeepable(&error),
                 done => return done,
             },
         };
-        let record = self.record(position, made_of, outcome);
+        let record = self.record(position, self.made_of(set, |_| true), outcome);
         self.batch.unkept.lock().unwrap_or_else(PoisonError::into_inner).insert(position, record.clone());
         Ok(Attempt::Done(record))
     }
@@ -132,22 +131,24 @@ impl<'a> Work<'a> {
     ///
     /// # Errors
     /// [`Error::Cancelled`], and those of making the folder and keeping the record.
-    fn attempt_in_folder(&self, position: usize, made_of: &Value, context: &StageContext) -> Result<Attempt> {
+    fn attempt_in_folder(&self, position: usize, context: &StageContext) -> Result<Attempt> {
         let (set, folder) = (&self.batch.sets[position], self.folder_of(position));
-        if self.is_done(position, made_of) && !Claim::is_begun(&folder) {
+        if self.is_done(position) && !Claim::is_begun(&folder) {
             return Ok(Attempt::WasDone);
         }
         let Some(claim) = Claim::take(&folder)? else { return Ok(Attempt::Elsewhere) };
         // Another program may have done it in between, or been killed as soon as it was done.
-        if self.is_done(position, made_of) {
+        if self.is_done(position) {
             claim.release();
             return Ok(Attempt::WasDone);
         }
         if !claim.is_locked && !self.told_of_locks.swap(true, Ordering::Relaxed) {
             context.report(without_locks(&self.batch.job.output));
         }
+        // As the photographs are before they are read: what changes under way is to be seen next time.
+        let made_of = self.made_of(set, |_| true);
         let done = self.outcome(set, &folder, &claim, context).and_then(|outcome| {
-            let record = self.record(position, made_of.clone(), outcome);
+            let record = self.record(position, made_of, outcome);
             record.write(&folder).map(|()| record)
         });
         claim.release();
@@ -173,20 +174,24 @@ impl<'a> Work<'a> {
     }
 
     /// Whether a set need not be stitched again.
-    fn is_done(&self, position: usize, made_of: &Value) -> bool {
+    fn is_done(&self, position: usize) -> bool {
         let Some(record) = SetRecord::read(&self.folder_of(position)) else { return false };
+        // To open every photograph of an archive in each run takes long, and says something only where one could not be read then.
+        let made_of = || self.made_of(&self.batch.sets[position], |photograph| record.was_unreadable(photograph));
         let is_tried_again = self.failed_before.get(&position) == Some(&record.ended_ms);
-        !is_tried_again && record.is_of(made_of) && record.files_are_whole(&self.batch.job.output)
+        !is_tried_again && record.is_of(&made_of()) && record.files_are_whole(&self.batch.job.output)
     }
 
     /// What decides the panoramas of a set: the program, the options and the photographs as they lie on the disk. Where the
-    /// tree of folders is mounted decides nothing: machines that share it may differ in that.
-    fn made_of(&self, set: &PhotographsOfFolder) -> Value {
-        let photograph = |path: &PathBuf| {
+    /// tree of folders is mounted decides nothing: machines that share it may differ in that. Whether a photograph can be read is
+    /// found out where `is_opened` says so, by its position.
+    fn made_of(&self, set: &PhotographsOfFolder, is_opened: impl Fn(usize) -> bool) -> Value {
+        let photograph = |(position, path): (usize, &PathBuf)| {
             let metadata = std::fs::metadata(path).ok();
             let modified = metadata.as_ref().and_then(|metadata| metadata.modified().ok());
             // Its permissions are no part of what it is; whether they let it be read is.
-            let is_unreadable = metadata.as_ref().is_some_and(std::fs::Metadata::is_file) && File::open(path).is_err();
+            let is_file = metadata.as_ref().is_some_and(std::fs::Metadata::is_file);
+            let is_unreadable = is_file && is_opened(position) && File::open(path).is_err();
             let mut photograph = json!({
                 "path": path.strip_prefix(&self.batch.job.folder).unwrap_or(path).display().to_string(),
                 "bytes": metadata.map(|metadata| metadata.len()),
@@ -198,7 +203,7 @@ impl<'a> Work<'a> {
             photograph
         };
         let mut made_of = self.decided_by.clone();
-        made_of[PHOTOGRAPHS] = set.photographs.iter().map(photograph).collect();
+        made_of[PHOTOGRAPHS] = set.photographs.iter().enumerate().map(photograph).collect();
         made_of
     }
 
