@@ -264,6 +264,20 @@ fn cut_pngs_tiffs_and_webps_are_refused() {
     }
 }
 
+/// Twelve bytes end a PNG; those before them are the sum of the pixels' chunk.
+#[test]
+fn a_png_that_lacks_its_end_alone_is_read() {
+    let folder = TempDir::new().expect("a temporary folder");
+    for bytes in [rgb8().file(Container::Png), rgb16().file(Container::Png)] {
+        let whole = photograph(&examine(write(&folder, "picture", &bytes))).expect("a photograph");
+        let read = |missing: usize| photograph(&examine(write(&folder, "picture", &bytes[..bytes.len() - missing])));
+        assert_eq!(read(12).expect("all of its pixels"), whole);
+        for missing in 13..30 {
+            assert!(matches!(read(missing), Err(Error::Input { .. })), "{missing} bytes");
+        }
+    }
+}
+
 #[test]
 fn files_that_change_after_the_scan_are_refused() {
     let folder = TempDir::new().expect("a temporary folder");

@@ -1,6 +1,6 @@
 //! PNG.
 
-use std::io::{BufWriter, Seek, Write};
+use std::io::{BufRead, BufWriter, Read, Result as IoResult, Seek, SeekFrom, Write};
 
 use png::text_metadata::ITXtChunk;
 use png::{
@@ -61,13 +61,53 @@ pub(crate) const SIDES: SideLimit = SideLimit { largest: (1 << 31) - 1, advice: 
 /// Keyword of the text chunk that holds XMP (XMP specification part 3, section 1.1.5).
 const XMP_KEYWORD: &str = "XML:com.adobe.xmp";
 
+/// The chunk that ends a PNG: no data, its name, and its sum (W3C PNG 11.2.5).
+const END: &[u8] = b"\0\0\0\0IEND\xae\x42\x60\x82";
+
+/// A file with the chunk behind it that ends a PNG. One that was cut right behind its last pixels has all of them; of one that was cut
+/// within them the chunk makes nothing whole, and of a whole file it is never read.
+struct Ended<'a> {
+    input: &'a mut Input,
+    /// What is left of the chunk.
+    rest: &'static [u8],
+}
+
+impl Read for Ended<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> IoResult<usize> {
+        let count = self.fill_buf()?.read(bytes)?;
+        self.consume(count);
+        Ok(count)
+    }
+}
+
+impl BufRead for Ended<'_> {
+    fn fill_buf(&mut self) -> IoResult<&[u8]> {
+        if self.input.fill_buf()?.is_empty() { Ok(self.rest) } else { self.input.fill_buf() }
+    }
+
+    fn consume(&mut self, count: usize) {
+        if self.input.buffer().is_empty() {
+            self.rest = self.rest.get(count..).unwrap_or_default();
+        } else {
+            self.input.consume(count);
+        }
+    }
+}
+
+impl Seek for Ended<'_> {
+    fn seek(&mut self, place: SeekFrom) -> IoResult<u64> {
+        self.rest = END;
+        self.input.seek(place)
+    }
+}
+
 /// A decoder that takes at most so many bytes beside the pixels and hands them out with 8 or 16 bits a sample, palettes as
 /// RGB. A profile, which may be a few bytes that stand for as many as there are, is read where it is wanted.
-fn decoder(
-    input: &mut Input,
+fn decoder<R: BufRead + Seek>(
+    input: R,
     bytes: usize,
     with_profile: bool,
-) -> std::result::Result<png::Reader<&mut Input>, DecodingError> {
+) -> std::result::Result<png::Reader<R>, DecodingError> {
     let mut decoder = Decoder::new_with_limits(input, Limits { bytes });
     decoder.set_ignore_text_chunk(false);
     decoder.set_ignore_iccp_chunk(!with_profile);
@@ -120,7 +160,8 @@ fn exif(input: &mut Input) -> Option<ExifFields> {
 fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
     let failed = |error: DecodingError| damaged(source, error);
     let limit = usize::try_from(decoding_limit(source)).unwrap_or(usize::MAX);
-    let mut reader = decoder(&mut input, limit, false).map_err(failed)?;
+    let input = Ended { input: &mut input, rest: END };
+    let mut reader = decoder(input, limit, false).map_err(failed)?;
     let (width, height) = reader.info().size();
     let (width, height) = (width as usize, height as usize);
     check_unchanged(source, width, height)?;
