@@ -63,7 +63,7 @@ pub fn write_labels(path: &Path, map: &dyn LabelMap, options: &OutputOptions, co
     let [width, height] = map.size();
     check_sides(path, SIDES, width, height)?;
     let mut pending = PendingFile::create(path)?;
-    write_map(pending.file(), map, options, context).map_err(|failure| failure.at(path))?;
+    write_map(pending.file(), map, options, context).map_err(|failure| failure.at(&pending.place()))?;
     context.check_cancelled()?;
     pending.commit()
 }

@@ -84,7 +84,7 @@ pub fn write_layers(
     let [width, height] = set.whole();
     check_sides(path, SideLimit { advice: "Lower canvas.scale.", ..SIDES }, width, height)?;
     let mut pending = PendingFile::create(path)?;
-    write_pages(pending.file(), set, metadata, options, context).map_err(|failure| failure.at(path))?;
+    write_pages(pending.file(), set, metadata, options, context).map_err(|failure| failure.at(&pending.place()))?;
     context.check_cancelled()?;
     pending.commit()
 }

@@ -92,7 +92,8 @@ pub fn write(
         Writer::Files { write, .. } => write(path, picture, options, context)?,
         Writer::File(write) => {
             let mut pending = PendingFile::create(path)?;
-            write(pending.file(), picture, metadata, options, context).map_err(|failure| failure.at(path))?;
+            write(pending.file(), picture, metadata, options, context)
+                .map_err(|failure| failure.at(&pending.place()))?;
             context.check_cancelled()?;
             pending.commit()?
         }
@@ -130,6 +131,6 @@ pub fn check_format(path: &Path, options: &OutputOptions) -> Result<()> {
 /// [`Error::Input`] if the folder does not exist or takes no files, [`Error::Io`] if the operating system refuses.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut pending = PendingFile::create(path)?;
-    std::io::Write::write_all(pending.file(), bytes).map_err(|error| Error::io("writing", path, error))?;
+    std::io::Write::write_all(pending.file(), bytes).map_err(|error| Error::io("writing", &pending.place(), error))?;
     pending.commit().map(drop)
 }

@@ -79,6 +79,15 @@ impl PendingFile {
         }
     }
 
+    /// Where what is written lies until then, as errors name it: what passes through lies in the folder for temporary files, which may
+    /// be full where the target is not.
+    pub(crate) fn place(&self) -> PathBuf {
+        match self.way {
+            Way::Renamed { .. } => self.target.clone(),
+            Way::Through(_) => std::env::temp_dir(),
+        }
+    }
+
     /// Gives the file its name, or passes it on; returns its length in bytes.
     pub(crate) fn commit(self) -> Result<u64> {
         let Self { target, way } = self;
@@ -163,6 +172,16 @@ pub(super) fn allow_umask(_builder: &mut tempfile::Builder, _mode: u32) {}
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn what_passes_through_lies_elsewhere_until_then() {
+        let pending = |path: &str| PendingFile::create(Path::new(path)).expect("possible").place();
+        assert_eq!(pending("/dev/null"), std::env::temp_dir());
+        let desk = tempfile::tempdir().expect("a folder");
+        let file = desk.path().join("pano.jpg");
+        assert_eq!(PendingFile::create(&file).expect("possible").place(), resolved(&file));
+    }
 
     #[test]
     fn a_full_disk_is_told_from_a_folder_that_takes_nothing() {

@@ -164,7 +164,7 @@ impl Studio {
     /// # Errors
     /// If there can be no temporary folder or no threads.
     pub(crate) fn new(root: Option<Folder>) -> trueup::Result<Self> {
-        let failed = |error| trueup::Error::io("making a folder for", Path::new("temporary files"), error);
+        let failed = |error| trueup::Error::io("making a folder in", &std::env::temp_dir(), error);
         let desk = tempfile::Builder::new().prefix("trueup-").tempdir().map_err(failed)?;
         for folder in [Self::DROPPED, Self::MASKS, Self::PICTURES, Self::EXPORTS] {
             std::fs::create_dir(desk.path().join(folder)).map_err(failed)?;
