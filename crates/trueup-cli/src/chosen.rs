@@ -50,7 +50,7 @@ fn views_of_the_mesh(typed: &TypedOptions, options: &StitchOptions) -> impl Iter
 
 fn read_config(options: &mut StitchOptions, path: &Path) -> Result<(), Failure> {
     let shown = path.display();
-    let text = std::fs::read_to_string(path).map_err(|error| {
+    let text = trueup::text::read_to_string(path).map_err(|error| {
         Failure::usage(format!("{shown}: the configuration cannot be read ({error})"), "Check the path after --config.")
     })?;
     options

@@ -35,6 +35,7 @@ pub(crate) fn run(args: ServeArgs) -> Result<(), Failure> {
 }
 
 fn first_line(file: &Path) -> Result<String, Failure> {
-    let text = std::fs::read_to_string(file).map_err(|error| Error::io("reading the password from", file, error))?;
+    let text =
+        trueup::text::read_to_string(file).map_err(|error| Error::io("reading the password from", file, error))?;
     Ok(text.lines().next().unwrap_or_default().to_owned())
 }

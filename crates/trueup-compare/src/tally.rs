@@ -96,7 +96,7 @@ pub struct MethodScore {
 /// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is none, damaged, of a later version, or a ranking in it names
 /// an entry twice or too few or too many.
 pub fn read_rankings(path: &Path) -> Result<RankingResults> {
-    let bytes = std::fs::read(path).map_err(|error| Error::io("reading", path, error))?;
+    let bytes = trueup_io::text::read(path).map_err(|error| Error::io("reading", path, error))?;
     parse(&bytes, &path.display().to_string())
 }
 

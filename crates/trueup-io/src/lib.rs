@@ -7,6 +7,7 @@
 //! * [`encode`] writes a panorama row by row; a file appears complete or not at all.
 //! * [`developing`] has camera raw developed by programs that are installed.
 //! * [`video`] takes frames out of videos.
+//! * [`text`] reads files of text, bounded.
 //! * [`scratch`] keeps on disk what does not fit in memory, and knows how much room there is.
 //!
 //! Sizes are checked from the header before pixels are allocated, and no input makes these functions panic.
@@ -25,4 +26,5 @@ mod metadata;
 pub mod provenance;
 pub mod scratch;
 pub mod source;
+pub mod text;
 pub mod video;

@@ -153,7 +153,7 @@ fn text(value: &Bound<'_, PyAny>) -> PyResult<String> {
 }
 
 fn read_config(options: &mut StitchOptions, path: &std::path::Path) -> trueup::Result<()> {
-    let text = std::fs::read_to_string(path).map_err(|error| Error::io("reading", path, error))?;
+    let text = trueup::text::read_to_string(path).map_err(|error| Error::io("reading", path, error))?;
     options.merge_toml(&text, &path.display().to_string())
 }
 

@@ -75,4 +75,5 @@ pub use trueup_io::encode::{
     write as write_picture, write_atomically, written_extensions,
 };
 pub use trueup_io::source::{InMemory, names_photograph, read_extensions, readable_formats};
+pub use trueup_io::text;
 pub use workers::{TakeResult, Worker, Workers};

@@ -54,7 +54,7 @@ impl Inputs {
     pub(crate) fn graph_file(&self, photographs: &[&Path]) -> Result<GraphFile> {
         let Some(path) = &self.graph else { return Ok(GraphFile::default()) };
         let file = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|error| Error::io("reading", path, error))?;
+        let bytes = trueup_io::text::read(path).map_err(|error| Error::io("reading", path, error))?;
         let text = std::str::from_utf8(&bytes).map_err(|error| {
             let reason = format!("it is no text in UTF-8 ({error})");
             Error::input(&file, reason, "Save it as text in UTF-8, with one pair per line as NAME -- NAME.")

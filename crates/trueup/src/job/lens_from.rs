@@ -118,7 +118,7 @@ fn centered(lens: &PlacedLens) -> PlacedLens {
 /// # Errors
 /// [`Error::Io`] if the file cannot be read; [`Error::Input`] if it is no project, or knows no lens for any photograph.
 pub(crate) fn tell_lenses(path: &Path, images: &mut [SourceImage], context: &StageContext) -> Result<()> {
-    let text = std::fs::read_to_string(path).map_err(|error| Error::io("reading", path, error))?;
+    let text = trueup_io::text::read_to_string(path).map_err(|error| Error::io("reading", path, error))?;
     let file = path.display().to_string();
     let known = match HuginProject::is_one(&text, path) {
         true => HuginProject::parse(&text, &file)?.lens_records().iter().filter_map(KnownLens::of).collect(),

@@ -28,7 +28,7 @@ pub fn read_project(path: &Path, context: &StageContext) -> Result<Project> {
     if path.is_dir() {
         return Err(Error::input(file, "it is a folder", "Give a file that `trueup stitch --project` wrote."));
     }
-    let bytes = std::fs::read(path).map_err(|error| Error::io("reading", path, error))?;
+    let bytes = trueup_io::text::read(path).map_err(|error| Error::io("reading", path, error))?;
     // What is no text is no project either; the readers say so.
     let text = String::from_utf8_lossy(&bytes);
     if !HuginProject::is_one(&text, path) {

@@ -130,7 +130,7 @@ struct Known<'a> {
 /// # Errors
 /// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is no truth, damaged, or impossible.
 pub fn read_truth(path: &Path) -> Result<Truth> {
-    let bytes = std::fs::read(path).map_err(|error| Error::io("reading", path, error))?;
+    let bytes = trueup_io::text::read(path).map_err(|error| Error::io("reading", path, error))?;
     let subject = path.display().to_string();
     let truth: Truth = serde_json::from_slice(&bytes).map_err(|error| {
         let reason = format!("not a truth file ({error})");
