@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::json;
 use trueup::Error;
 use trueup_server::{Network, Serving, serve};
+use trueup_terminal::Ending;
 
 use crate::arguments::ServeArgs;
 use crate::failure::Failure;
@@ -19,8 +20,8 @@ pub(crate) fn run(args: ServeArgs) -> Result<(), Failure> {
     let port = args.port.unwrap_or(0);
     let serving = Serving { folder: args.folder, port, network };
     let (mut printed, json) = (Ok(()), args.json);
-    // Nothing is at work most of the time, and what is stops with the server: there is nothing that a last resort would save.
-    let cancel = trueup_terminal::cancel_token("trueup", "", None);
+    // The server waits for no work long, and removes its temporary files at the end.
+    let cancel = trueup_terminal::cancel_token("trueup", "", Ending::Soon);
     let served = serve(&serving, &cancel, |address| {
         let told = json!({ "format": "trueup-serve", "version": 1, "address": address });
         printed = output::print(&match json {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use trueup::{CancelToken, Error};
-use trueup_terminal::WithoutMemory;
+use trueup_terminal::{Ending, WithoutMemory};
 
 use crate::failure::{Failure, STATUS_FAILURE};
 
@@ -16,7 +16,7 @@ pub(crate) fn cancel_token() -> Arc<CancelToken> {
         trueup::abandon_unfinished();
         trueup_terminal::complain(&Failure::from(Error::Cancelled).to_string());
     };
-    trueup_terminal::cancel_token("trueup", "", Some(last_resort))
+    trueup_terminal::cancel_token("trueup", "", Ending::By(last_resort))
 }
 
 /// Has the program end by an error, with nothing half written, where Rust would abort it for want of memory. For a program

@@ -21,6 +21,24 @@ fn it_prints_an_address_and_leaves_nothing_behind() {
     assert!(desk.files().is_empty(), "{:?}", desk.files());
 }
 
+/// Some programs send several requests to terminate.
+#[cfg(unix)]
+#[test]
+fn a_second_request_to_terminate_leaves_nothing_behind() {
+    let desk = Desk::new();
+    let mut command = trueup(desk.path(), &["serve", "."]);
+    command.env("TMPDIR", desk.path()).stdout(Stdio::piped());
+    let mut child = command.spawn().expect("the command starts");
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("UTF-8");
+    assert_eq!(desk.files().len(), 1, "its temporary files");
+    // The second comes before the server looks whether it is to stop, which it does ten times a second; later ones find nobody.
+    let kill = format!("for i in 1 2 3 4 5; do kill -TERM {}; sleep 0.02; done 2>/dev/null; true", child.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().expect("sh runs").success());
+    assert_eq!(child.wait().expect("it ends").code(), Some(0), "as by one");
+    assert!(desk.files().is_empty(), "{:?}", desk.files());
+}
+
 #[test]
 fn programs_are_told_the_address_as_json() {
     let desk = Desk::new();

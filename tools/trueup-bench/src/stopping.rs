@@ -6,5 +6,9 @@ use trueup::CancelToken;
 
 /// A token that the first request to stop cancels; the second ends the program.
 pub(crate) fn cancel_token() -> Arc<CancelToken> {
-    trueup_terminal::cancel_token("trueup-bench", "stopping; what is done is kept", None)
+    trueup_terminal::cancel_token(
+        "trueup-bench",
+        "stopping; what is done is kept",
+        trueup_terminal::Ending::WhenStopped,
+    )
 }
