@@ -323,21 +323,25 @@ fn stacked_set(
 }
 
 fn left_out(image: &SourceImage, reference: &str, reason: LeftOut) -> RejectedSource {
-    let (code, why) = match reason {
-        LeftOut::Spare => (SPARE, "those before and after it are enough".to_owned()),
-        LeftOut::NotAligned(Unaligned::NoPicture) => (NOT_ALIGNED, "it is too small to be aligned".to_owned()),
-        LeftOut::NotAligned(Unaligned::OtherDetails(correlation)) => {
-            (NOT_ALIGNED, format!("its details are others once it is aligned (they correlate by {correlation:.2})"))
-        }
+    // Where the reason is the same for every stack, it does not name the stack: exposures of one reason are told together.
+    let of_any = |why: &str| format!("it is an exposure of a stack, but {why}");
+    let of_this = |why: String| format!("it is an exposure of the stack of {reference}, but {why}");
+    let (code, reason) = match reason {
+        LeftOut::Spare => (SPARE, of_any("those before and after it are enough")),
+        LeftOut::NotAligned(Unaligned::NoPicture) => (NOT_ALIGNED, of_any("it is too small to be aligned")),
+        LeftOut::NotAligned(Unaligned::OtherDetails(correlation)) => (
+            NOT_ALIGNED,
+            of_this(format!("its details are others once it is aligned (they correlate by {correlation:.2})")),
+        ),
         LeftOut::NotAligned(Unaligned::TooFar(share)) => {
-            (NOT_ALIGNED, format!("it lies {:.0} % of a side away", 100.0 * share))
+            (NOT_ALIGNED, of_this(format!("it lies {:.0} % of a side away", 100.0 * share)))
         }
     };
     RejectedSource {
         path: image.path.clone(),
         name: image.name.clone(),
         code: code.to_owned(),
-        reason: format!("it is an exposure of the stack of {reference}, but {why}"),
+        reason,
         hint: "Give --stacks none to have every photograph stitched by itself.".to_owned(),
     }
 }
@@ -372,6 +376,16 @@ mod tests {
     use crate::job::inputs::{Inputs, Reference};
     use crate::memo::PhotographCache;
     use crate::pipeline::Stitcher;
+
+    /// Those of one reason are told in one line.
+    #[test]
+    fn spare_exposures_of_several_stacks_have_one_reason() {
+        let spare = SourceImage::unknown("spare.jpg", "spare.jpg", [40, 30]);
+        let reason = |reference: &str, reason: LeftOut| left_out(&spare, reference, reason).reason;
+        assert_eq!(reason("a.jpg", LeftOut::Spare), reason("b.jpg", LeftOut::Spare));
+        let far = |reference: &str| reason(reference, LeftOut::NotAligned(Unaligned::TooFar(0.3)));
+        assert!(far("a.jpg").contains("the stack of a.jpg") && far("b.jpg").contains("the stack of b.jpg"));
+    }
 
     const GAINS: [f32; 3] = [1.0, 0.4, 2.2];
 
