@@ -98,3 +98,25 @@ fn a_lens_is_looked_for_where_none_was_told() {
     assert!(!cameras[0].lens.is_pinhole() && cameras[0].lens != cameras[3].lens);
     assert!(worst_rotation_error(&truth, &cameras) < 0.25);
 }
+
+/// By hand: 90 degrees across a pinhole's longer side are a focal length of half of it, and no pinhole sees half a turn.
+#[test]
+fn a_told_field_of_view_and_a_told_focal_length_do_not_forget_each_other() {
+    let of_project = CameraPrior { focal_px: Some(660.0), focal_told: true, ..CameraPrior::unknown(frame(), 0) };
+    let recorded = CameraPrior { focal_told: false, ..of_project };
+    let told = |prior: CameraPrior, fov: f64| {
+        let told = prior.told_by(&CameraOptions { fov, lens: LensKind::Pinhole, ..CameraOptions::default() });
+        (told.focal_px.map(f64::round), told.focal_told)
+    };
+    let half = 0.5 * of_project.longer();
+    for (prior, fov, expected) in [
+        (of_project, 0.0, (Some(660.0), true)),
+        (of_project, 90.0, (Some(half), true)),
+        (of_project, 200.0, (Some(660.0), true)),
+        (recorded, 0.0, (Some(660.0), false)),
+        (recorded, 90.0, (Some(half), true)),
+        (recorded, 200.0, (Some(660.0), false)),
+    ] {
+        assert_eq!(told(prior, fov), expected, "{fov} degrees, told before: {}", prior.focal_told);
+    }
+}
