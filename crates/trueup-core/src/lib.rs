@@ -31,6 +31,7 @@ pub mod matches;
 pub mod memory;
 pub mod mesh;
 pub mod options;
+pub mod outline;
 pub mod raster;
 pub mod scratch;
 pub mod source;

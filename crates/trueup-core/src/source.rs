@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::inset::Inset;
 use crate::lens::PlacedLens;
 use crate::mask::Masks;
+use crate::outline::Outline;
 use crate::raster::Photograph;
 
 /// Where a focal length came from.
@@ -79,6 +80,10 @@ pub struct SourceImage {
     /// What of the picture in the file lies beside the photograph, after orientation: it is cut off on decoding.
     #[serde(default)]
     pub inset: Inset,
+    /// Inside of what the photograph lies, in pixels of width and height, where these hold more than it: what is beside it becomes
+    /// transparent on decoding.
+    #[serde(default)]
+    pub outline: Option<Outline>,
     /// EXIF orientation (1 to 8) that is applied on decoding: 1 where the tag is absent or stale.
     pub orientation: u8,
     /// Focal length from metadata, if believable.
@@ -119,6 +124,7 @@ impl SourceImage {
             width,
             height,
             inset: Inset::default(),
+            outline: None,
             orientation: 1,
             focal_prior: None,
             camera_model: None,
@@ -140,7 +146,7 @@ impl SourceImage {
 
     /// The photograph that lies in this picture inside `inset`, with what is known of its lens; `None` if nothing is left of it.
     ///
-    /// A stated focal length in terms of 35 mm film is taken to be that of the photograph, which was smaller on the film then; any other
+    /// Its outline is not known then. A stated focal length in terms of 35 mm film is taken to be that of the photograph, which was smaller on the film then; any other
     /// one has to do with pixels.
     pub fn inside(self, inset: Inset) -> Option<Self> {
         let [old_width, old_height] = [self.width, self.height];
@@ -158,7 +164,7 @@ impl SourceImage {
         let (outer, inner) = (self.inset.sides(), inset.sides());
         let inset = Inset::from_sides(std::array::from_fn(|side| outer[side].saturating_add(inner[side])));
         let (focal_prior, lens) = (self.focal_prior.map(of_photograph), self.lens.map(moved));
-        Some(Self { width, height, inset, focal_prior, lens, ..self })
+        Some(Self { width, height, inset, outline: None, focal_prior, lens, ..self })
     }
 
     /// Whether the file says something of the camera that took it.
