@@ -7,11 +7,11 @@ use trueup_core::raster::Raster;
 use trueup_core::statistics::median_of;
 
 /// Most that samples of an even border differ from its own level, in gray levels: compression moves them so far.
-const EVEN: f32 = 10.0;
+pub(crate) const EVEN: f32 = 10.0;
 /// Share of a line's samples that must be even. Dust is the rest, and how compression rings beside edges.
 const MOST_OF_A_LINE: f64 = 0.9;
 /// Least difference of the photograph from the border beside it, in gray levels.
-const STEP: f32 = 20.0;
+pub(crate) const STEP: f32 = 20.0;
 /// Share of a border along which the photograph must differ from it. A night lies behind black bars in part; where a blown sky ends
 /// at a skyline, next to nothing of its last line does.
 const DIFFERS: f64 = 0.5;

@@ -11,5 +11,6 @@ mod gray;
 pub mod line_matching;
 pub mod lines;
 pub mod matching;
+pub mod padding;
 pub mod pairing;
 pub mod stacks;
