@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use trueup_core::color::{LightRange, TransferCurve};
-use trueup_core::mask::Masks;
+use trueup_core::mask::{Mask, Masks};
 use trueup_core::raster::Photograph;
 use trueup_core::source::{AlignedPhotograph, PhotographSource, SourceImage, StackFusion, StackMember, WorkingFrame};
 use trueup_core::{Error, Result};
@@ -183,7 +183,8 @@ impl FilePhotographs {
         let is_as_given = self.conversion(index).is_none()
             && source.stack.is_empty()
             && self.light.is_none()
-            && source.inset.is_none();
+            && source.inset.is_none()
+            && source.outline.is_none();
         if let Some(photograph) = self.in_memory(index).filter(|_| is_as_given) {
             return whole(photograph);
         }
@@ -193,6 +194,18 @@ impl FilePhotographs {
             self.keep_reduced(index, Reduced { frame: *frame, thumbnail_max_area, picture: picture.clone() });
         }
         Ok(picture)
+    }
+
+    /// What of photograph `index` is not to be looked at: the parts that its photographer ignores, and what lies beside its outline.
+    pub fn not_looked_at(&self, index: usize) -> Option<Arc<Mask>> {
+        let ignored = self.masks(index).ignored;
+        let source = self.sources.get(index)?;
+        let Some(outline) = &source.outline else { return ignored };
+        let beside = outline.beside([source.width, source.height]);
+        Some(Arc::new(match ignored {
+            Some(ignored) => beside.or(&ignored),
+            None => beside,
+        }))
     }
 
     /// Forgets photograph `index` if it is kept: for those that will not be asked for again.
@@ -212,6 +225,10 @@ impl FilePhotographs {
         let photograph = match &self.fusion {
             Some(fusion) if !source.stack.is_empty() => self.of_stack(index, source, reference, fusion.as_ref())?,
             _ => self.in_common_light(reference, source)?,
+        };
+        let photograph = match &source.outline {
+            Some(outline) => outline.cut(&photograph),
+            None => photograph,
         };
         if let Some(bytes) = self.bytes.get(index) {
             bytes.store(photograph.bytes(), Ordering::Relaxed);

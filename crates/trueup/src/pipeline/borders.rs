@@ -1,12 +1,15 @@
-//! The borders phase: photographs that lie inside an even border in their files are measured again without it.
+//! The borders phase: photographs that lie inside an even border in their files, or askew in them, are measured again without what lies
+//! beside them.
 
 use std::collections::BTreeMap;
 
 use trueup_core::diagnostics::{Diagnostic, Reported, Subject, add_seconds};
 use trueup_core::inset::Inset;
+use trueup_core::outline::Outline;
 use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Result, StageContext};
 use trueup_vision::border::EvenBorder;
+use trueup_vision::padding::{CommonPadding, Padding, StraightSided};
 
 use super::light::WantedLight;
 use super::measure::{self, MeasureInput, Measurements};
@@ -36,21 +39,45 @@ pub(super) struct Unbordered {
     pub measurements: Reported<Measurements>,
 }
 
-/// Cuts the photographs that lie inside a border out of it and measures them again; without any, everything stays as it was.
+/// What of a picture is no part of the photograph in it.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Beside {
+    /// Strips along the sides, in full pixels.
+    inset: Inset,
+    /// Or inside of what the photograph lies, in full pixels, where it is not parallel to these.
+    outline: Option<Outline>,
+}
+
+impl Beside {
+    fn is_nothing(&self) -> bool {
+        self.inset.is_none() && self.outline.is_none()
+    }
+
+    /// The photograph in the picture `image`.
+    fn inside(&self, image: &SourceImage) -> SourceImage {
+        match &self.outline {
+            Some(outline) => SourceImage { outline: Some(outline.clone()), ..image.clone() },
+            None => image.clone().inside(self.inset).unwrap_or_else(|| image.clone()),
+        }
+    }
+}
+
+/// Takes what lies beside them from the photographs inside a border, or askew, and measures them again; without any, everything stays as it
+/// was.
 ///
 /// # Errors
 /// [`trueup_core::Error::Limits`]; [`trueup_core::Error::Cancelled`].
 pub(super) fn run(input: BordersInput, options: &StitchOptions, context: &StageContext) -> Result<Unbordered> {
     let BordersInput { found, mut measurements, memo, shelf, keep_grays } = input;
-    let insets = insets(&found.value.images, &measurements.value);
-    let cut: Vec<usize> = (0..insets.len()).filter(|&number| !insets[number].is_none()).collect();
+    let beside = beside(&found.value.images, &measurements.value);
+    let cut: Vec<usize> = (0..beside.len()).filter(|&number| !beside[number].is_nothing()).collect();
     if cut.is_empty() {
         return Ok(Unbordered { found, measurements });
     }
     let (old, mut told) = found.split();
-    let inside = |(image, &inset): (&SourceImage, &Inset)| image.clone().inside(inset);
-    let images = old.images.iter().zip(&insets).map(|one| inside(one).unwrap_or_else(|| one.0.clone())).collect();
-    let masks = (0..insets.len()).map(|number| old.files.masks(number).inside(insets[number])).collect();
+    let images = old.images.iter().zip(&beside).map(|(image, beside)| beside.inside(image)).collect();
+    let masks =
+        beside.iter().enumerate().map(|(number, beside)| old.files.masks(number).inside(beside.inset)).collect();
     let photographs = FoundPhotographs {
         images,
         in_memory: old.files.in_memory_photographs().clone(),
@@ -66,7 +93,7 @@ pub(super) fn run(input: BordersInput, options: &StitchOptions, context: &StageC
     // What was told of features and lines was of those with the border's.
     measurements
         .findings
-        .retain(|one| !matches!(one.subject, Subject::Photograph(number) if !insets[number].is_none()));
+        .retain(|one| !matches!(one.subject, Subject::Photograph(number) if !beside[number].is_nothing()));
     measurements.findings.extend(told_again.findings);
     add_seconds(&mut measurements.seconds, told_again.seconds);
     let Measurements { photographs, keys } = again;
@@ -78,13 +105,13 @@ pub(super) fn run(input: BordersInput, options: &StitchOptions, context: &StageC
     Ok(Unbordered { found: told.map(|()| set), measurements })
 }
 
-/// What of each photograph's file lies beside it, in full pixels.
-fn insets(images: &[SourceImage], measurements: &Measurements) -> Vec<Inset> {
+/// What of each photograph's file lies beside it.
+fn beside(images: &[SourceImage], measurements: &Measurements) -> Vec<Beside> {
     let mut of_size: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
     for (number, image) in images.iter().enumerate().filter(|(number, _)| measurements.photographs[*number].is_ok()) {
         of_size.entry([image.width, image.height]).or_default().push(number);
     }
-    let mut insets = vec![Inset::default(); images.len()];
+    let mut beside = vec![Beside::default(); images.len()];
     for (&size, members) in &of_size {
         let measured: Vec<&Measured> =
             members.iter().filter_map(|&number| measurements.photographs[number].as_ref().ok()).collect();
@@ -94,11 +121,35 @@ fn insets(images: &[SourceImage], measurements: &Measurements) -> Vec<Inset> {
             let inset = inset.map(full);
             // Of a picture of a few pixels, nothing may be left.
             if inset.inner(size).is_some() {
-                insets[number] = inset;
+                beside[number].inset = inset;
+            }
+        }
+        for ((&number, outline), measured) in members.iter().zip(outlines(&measured)).zip(&measured) {
+            if let Some(outline) = outline {
+                let outline = Some(outline.scaled(1.0 / measured.frame.working_from_full));
+                beside[number] = Beside { inset: Inset::default(), outline };
             }
         }
     }
-    insets
+    beside
+}
+
+/// Inside of what the photographs of pictures of one size lie, in working pixels.
+fn outlines(measured: &[&Measured]) -> Vec<Option<Outline>> {
+    // The casts are of sizes of rasters, to the nearest whole pixel.
+    let Some(size) = measured.first().map(|one| [one.frame.width as usize, one.frame.height as usize]) else {
+        return Vec::new();
+    };
+    let paddings: Vec<&Padding> = measured.iter().map(|measured| &measured.padding).collect();
+    let common = CommonPadding::of(&paddings, size);
+    let alone: Vec<Option<StraightSided>> = paddings.iter().map(|padding| padding.quadrilateral(size)).collect();
+    // Those that lie straight keep the size of the others: one camera took them.
+    let is_askew = alone.iter().flatten().any(|found| found.is_askew);
+    let of_one = |(padding, alone): (&&Padding, Option<StraightSided>)| match &common {
+        Some(common) if common.suits(padding) => Some(common.outline.clone()),
+        _ => alone.filter(|_| is_askew).map(|found| found.outline),
+    };
+    paddings.iter().zip(alone).map(of_one).collect()
 }
 
 /// The borders of pictures of one size, which often have one in common. Half of them tell it; where it ends beside a sky as bright, or a
@@ -129,10 +180,20 @@ fn is_same(one: usize, other: usize) -> bool {
 }
 
 fn note(number: usize, image: &SourceImage) -> Diagnostic {
-    let [left, top, right, bottom] = image.inset.sides();
-    let message = format!(
-        "it lies inside an even border, which is left out ({left}, {top}, {right} and {bottom} px at the left, top, right and bottom)"
-    );
+    let message = match &image.outline {
+        Some(outline) => {
+            let percent = 100.0 * (1.0 - outline.share_of([image.width, image.height]));
+            format!(
+                "it lies askew, or with bent sides, in an even picture, whose rest is left out ({percent:.1} % of it)"
+            )
+        }
+        None => {
+            let [left, top, right, bottom] = image.inset.sides();
+            format!(
+                "it lies inside an even border, which is left out ({left}, {top}, {right} and {bottom} px at the left, top, right and bottom)"
+            )
+        }
+    };
     Diagnostic::note(
         "border-left-out",
         Subject::Photograph(number),

@@ -6,12 +6,13 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 use trueup_core::diagnostics::Reported;
 use trueup_core::raster::Raster;
-use trueup_core::source::{PhotographSource, WorkingFrame};
+use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 use trueup_vision::border::even_border;
 use trueup_vision::features;
 use trueup_vision::lines;
+use trueup_vision::padding::padding;
 
 use super::budget::MANY_PER_THREAD;
 use super::measured::Measured;
@@ -215,17 +216,17 @@ fn measure(one: &OnePhotograph, options: &MeasureOptions, context: &StageContext
     );
     let (mut features, (mut lines, mut curves)) = (features?, lines?);
     let mut thumbnail = picture.thumbnail;
-    if let Some(ignored) = files.masks(index).ignored {
+    if let Some(ignored) = files.not_looked_at(index) {
         features = outside(&features, &ignored, &frame);
         lines = lines_outside(lines, &ignored, &frame);
         curves = curves_outside(curves, &ignored, &frame);
         blacken(&mut thumbnail, &ignored, &picture.thumbnail_frame);
     }
-    let border = even_border(&picture.gray);
+    let (border, padding) = (even_border(&picture.gray), padding(&picture.gray));
     let gray = keep_grays.then(|| eight_bit(&picture.gray));
     let features = ShelvedFeatures::Held(features);
     let thumbnail_frame = picture.thumbnail_frame;
-    Ok(Measured { frame, features, lines, curves, gray, thumbnail, thumbnail_frame, border })
+    Ok(Measured { frame, features, lines, curves, gray, thumbnail, thumbnail_frame, border, padding })
 }
 
 /// Gray values rounded to eight bits.
@@ -261,7 +262,7 @@ pub(crate) fn thumbnails(
         let frame = WorkingFrame::new(image.width, image.height, options.working.pixels);
         let picture = photographs.working(index, &frame, THUMBNAIL_PIXELS)?;
         let mut thumbnail = picture.thumbnail;
-        if let Some(ignored) = photographs.masks(index).ignored {
+        if let Some(ignored) = photographs.not_looked_at(index) {
             blacken(&mut thumbnail, &ignored, &picture.thumbnail_frame);
         }
         Ok(SmallCopy { thumbnail, frame: picture.thumbnail_frame })

@@ -8,6 +8,7 @@ use trueup_core::raster::Raster;
 use trueup_core::source::WorkingFrame;
 use trueup_vision::border::EvenBorder;
 use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
+use trueup_vision::padding::Padding;
 
 use super::shelf::ShelvedFeatures;
 
@@ -26,6 +27,8 @@ pub(crate) struct Measured {
     pub thumbnail_frame: WorkingFrame,
     /// What is even at the picture's sides, in working pixels.
     pub border: EvenBorder,
+    /// What is even between the picture's sides and a photograph askew in it, in working pixels.
+    pub padding: Padding,
 }
 
 impl Serialize for Measured {
@@ -76,6 +79,7 @@ struct StoredMeasured {
     thumbnail: StoredRaster,
     thumbnail_frame: WorkingFrame,
     border: EvenBorder,
+    padding: Padding,
 }
 
 impl StoredMeasured {
@@ -93,6 +97,7 @@ impl StoredMeasured {
             thumbnail: StoredRaster::new(&measured.thumbnail),
             thumbnail_frame: measured.thumbnail_frame,
             border: measured.border,
+            padding: measured.padding.clone(),
         })
     }
 
@@ -118,6 +123,7 @@ impl StoredMeasured {
             thumbnail: self.thumbnail.restored()?,
             thumbnail_frame: self.thumbnail_frame,
             border: self.border,
+            padding: self.padding,
         })
     }
 }

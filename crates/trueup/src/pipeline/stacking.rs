@@ -192,9 +192,9 @@ fn aligned_stacks(
         .map(|(number, (camera, measured))| {
             let count = known.len();
             let camera = *known.entry(camera).or_insert(count);
-            // Marks are of one exposure's pixels.
+            // Marks and outlines are of one exposure's pixels.
             let masks = set.files.masks(number);
-            let is_marked = masks.ignored.is_some() || masks.kept.is_some();
+            let is_marked = masks.ignored.is_some() || masks.kept.is_some() || set.images[number].outline.is_some();
             let thumbnail = measured.as_ref().ok().filter(|_| !is_marked).map(|measured| &measured.thumbnail);
             StackCandidate { thumbnail, camera, recorded_stops: set.images[number].exposure.stops }
         })

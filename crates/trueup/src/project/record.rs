@@ -15,6 +15,7 @@ use trueup_core::geometry::matrix_from_rows;
 use trueup_core::inset::Inset;
 use trueup_core::lens::{Lens, PlacedLens};
 use trueup_core::matches::PairVerdict;
+use trueup_core::outline::Outline;
 use trueup_io::source::unique_names;
 
 use super::projection::ProjectionRecord;
@@ -83,6 +84,10 @@ pub struct ImageRecord {
     /// photograph's own.
     #[serde(default, skip_serializing_if = "Inset::is_none")]
     pub inset: Inset,
+    /// Corners of the polygon inside of which the photograph lies in its picture, in its pixels; what is beside it is not shown. `None` where the
+    /// whole picture is the photograph.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outline: Option<Outline>,
     /// EXIF orientation (1 to 8) that was applied to the stored pixels; 0 in files of programs that did not record it.
     #[serde(default)]
     pub orientation: u8,

@@ -13,7 +13,7 @@ use trueup_core::interpolation::cubic_convolution_taps;
 use trueup_core::lens::Lens;
 use trueup_core::lines::LineSegment;
 use trueup_core::raster::Raster;
-use trueup_core::source::{PhotographSource, WorkingFrame};
+use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 use trueup_vision::lines::{self, LineOptions};
@@ -57,7 +57,7 @@ pub(super) fn lines<'a>(
             // What was too short to be kept of the photograph is too short now.
             let shortest = component.lines[k].iter().map(LineSegment::length).fold(f64::INFINITY, f64::min);
             let long = found.into_iter().filter(|line| line.length() >= shortest).collect();
-            Ok(match photographs.masks(member).ignored {
+            Ok(match photographs.not_looked_at(member) {
                 Some(ignored) => lines_outside(long, &ignored, frame),
                 None => long,
             })
