@@ -1,6 +1,6 @@
-//! Photographs that lie inside an even border in their files.
+//! Photographs that lie inside an even border in their files, or askew in them.
 
-use image::{GrayImage, Luma, Rgb};
+use image::{GrayImage, Luma, Rgb, Rgba};
 use serde_json::json;
 
 use crate::pictures::{HEIGHT, STREET_NAMES, WIDTH, jpeg, street_desk, street_pixels};
@@ -71,4 +71,50 @@ fn prints_are_stitched_without_their_paper_and_composed_again() {
         panorama.enumerate_pixels().filter(|(x, _, _)| is_outermost(*x)).map(|(_, _, pixel)| pixel).collect();
     let white = outermost.iter().filter(|pixel| pixel.0.iter().all(|&level| level >= 230)).count();
     assert!(white * 20 < outermost.len(), "{white} of {} pixels are white", outermost.len());
+}
+
+/// The street's photographs, each turned by 3 to 4.5 degrees into black as an editor does it.
+fn turned() -> Desk {
+    let desk = street_desk();
+    for ((name, rgb), degrees) in STREET_NAMES.into_iter().zip(street_pixels()).zip([3.0_f64, -4.0, 3.5, -4.5]) {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        let mut picture = vec![0; rgb.len()];
+        for (index, pixel) in picture.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            let x = (index % WIDTH) as f64 + 0.5 - WIDTH as f64 / 2.0;
+            let y = (index / WIDTH) as f64 + 0.5 - HEIGHT as f64 / 2.0;
+            let from = [x * cosine + y * sine + WIDTH as f64 / 2.0, y * cosine - x * sine + HEIGHT as f64 / 2.0];
+            if from[0] >= 0.0 && from[0] < WIDTH as f64 && from[1] >= 0.0 && from[1] < HEIGHT as f64 {
+                let start = 3 * (from[1] as usize * WIDTH + from[0] as usize);
+                pixel.copy_from_slice(&rgb[start..start + 3]);
+            }
+        }
+        desk.put(name, jpeg(&picture, WIDTH, HEIGHT));
+    }
+    desk
+}
+
+#[test]
+fn photographs_that_were_turned_are_stitched_without_what_that_left_and_composed_again() {
+    let desk = turned();
+    let wishes = ["--project", "pano.json", "--crop", "none"];
+    finish(trueup(desk.path(), &[&["stitch", "-o", "pano.png"], &STREET_NAMES[..], &wishes].concat())).expect_success();
+    let project = desk.json("pano.json");
+    for image in project["images"].as_array().expect("photographs") {
+        assert_eq!((&image["status"], &image["width"]), (&json!("used"), &json!(WIDTH)));
+        assert!((4..=8).contains(&image["outline"].as_array().expect("a polygon").len()), "{}", image["outline"]);
+    }
+    let told = |one: &&serde_json::Value| one["code"] == "border-left-out";
+    assert_eq!(project["diagnostics"].as_array().expect("findings").iter().filter(told).count(), 4);
+    finish(trueup(desk.path(), &["compose", "pano.json", "-o", "again.png", "--crop", "none"])).expect_success();
+    assert!(desk.read("pano.png") == desk.read("again.png"), "the same panorama");
+    // The scene has hardly anything black, of which a photograph has a twentieth when it was turned.
+    let panorama = image::open(desk.join("pano.png")).expect("a panorama").to_rgba8();
+    let opaque: Vec<&Rgba<u8>> = panorama.pixels().filter(|pixel| pixel.0[3] == 255).collect();
+    let is_black = |pixel: &[u8]| pixel[..3].iter().all(|&level| level < 12);
+    let black = opaque.iter().filter(|pixel| is_black(&pixel.0)).count();
+    let of_scene: usize =
+        street_pixels().iter().map(|rgb| rgb.chunks_exact(3).filter(|rgb| is_black(rgb)).count()).sum();
+    let share = black as f64 / opaque.len() as f64;
+    let share_of_scene = of_scene as f64 / (4 * WIDTH * HEIGHT) as f64;
+    assert!(share < share_of_scene + 0.003, "{share} instead of {share_of_scene}");
 }
