@@ -12,8 +12,6 @@ use crate::window::{common, near};
 pub struct Gaps {
     coverage: Coverage,
     size: [usize; 2],
-    /// Where the canvas's corner lies, pixels from a place that belongs to the scene: it stays when the canvas is cropped.
-    corner: [i64; 2],
     extent: Extent,
     around: bool,
     radius: f64,
@@ -58,8 +56,7 @@ impl Gaps {
         let size = [layout.width, layout.height];
         let is_turn = layout.period.is_some() && rectangle.columns == (0..layout.width);
         let radius = 0.5 * deepest(&coverage, &rectangle, is_turn);
-        let extent = Extent::Within(rectangle);
-        Self { coverage, size, corner: corner(layout), extent, around: layout.period.is_some(), radius }
+        Self { coverage, size, extent: Extent::Within(rectangle), around: layout.period.is_some(), radius }
     }
 
     /// The small gaps of a canvas; `fill` is a radius in photographs' sides, see
@@ -106,20 +103,12 @@ impl Gaps {
         let margin =
             margin.map(|(void, photographs)| (void - CORNER * radius_px).min(2.0 * radius_px - photographs)).collect();
         let extent = Extent::Small(SmallGaps { margin, columns, cell, lead });
-        let around = layout.period.is_some();
-        Self { coverage, size: [width, height], corner: corner(layout), extent, around, radius }
+        Self { coverage, size: [width, height], extent, around: layout.period.is_some(), radius }
     }
 
     /// Width and height of the canvas, pixels.
     pub(crate) fn canvas(&self) -> [usize; 2] {
         self.size
-    }
-
-    /// What `number` is of a pixel's place in the scene, whatever was cut off the canvas: it is given the columns of the pixel and of the one after it,
-    /// across the ends of a full turn, too, and the row.
-    pub(crate) fn of_scene<T>(&self, [x, y]: [usize; 2], number: impl Fn([i64; 2], i64) -> T) -> T {
-        let next = if self.around { (x + 1) % self.size[0].max(1) } else { x + 1 };
-        number([x, next].map(|x| x as i64 + self.corner[0]), y as i64 + self.corner[1])
     }
 
     /// The stretches of `columns` in row `y` that some photograph covers wholly, in ascending order.
@@ -182,13 +171,6 @@ impl Gaps {
     pub(crate) fn radius(&self) -> f64 {
         self.radius
     }
-}
-
-/// See [`Gaps`].
-fn corner(layout: &CanvasLayout) -> [i64; 2] {
-    /// Pixels: far beyond any canvas, and sums of such places are whole numbers still.
-    const FARTHEST: f64 = 1e15;
-    layout.origin.map(|length| (length * layout.canvas_from_target).round().clamp(-FARTHEST, FARTHEST) as i64)
 }
 
 /// Pixels, at most, from what is not covered of a rectangle to what is; 0 if nothing is covered. `is_turn` if its last column lies beside the
@@ -300,19 +282,6 @@ mod tests {
         let within = (0..200).all(|x| around.is_gap(x, 5) == around.is_gap((x + 77) % 200, 5));
         assert!(within && !around.is_gap(0, 5));
         assert!(gaps(&layout(200, 90, &places, Some(200)), 16.0).is_gap(199, 5));
-    }
-
-    #[test]
-    fn places_of_the_scene_stay_when_the_canvas_is_cropped() {
-        let whole =
-            CanvasLayout { origin: [12.25, -7.0], canvas_from_target: 2.0, ..layout(200, 80, &[[0.0; 2]], None) };
-        let place =
-            |layout: &CanvasLayout, pixel: [usize; 2]| gaps(layout, 5.0).of_scene(pixel, |columns, row| (columns, row));
-        let part = crate::crop::cropped(whole.clone(), &Rectangle { columns: 13..150, rows: 7..70 });
-        assert_eq!(place(&whole, [113, 57]), ([138, 139], 43));
-        assert_eq!(place(&part, [100, 50]), ([138, 139], 43));
-        let turn = layout(250, 60, &[[0.0; 2]], Some(250));
-        assert_eq!(place(&turn, [249, 3]), ([249, 0], 3));
     }
 
     /// A hole across the cut of a full turn is as wide as it is anywhere else.

@@ -9,7 +9,6 @@ mod average;
 mod checked;
 mod divided;
 mod fill;
-mod grain;
 mod helpers;
 mod input;
 mod layer;
