@@ -213,8 +213,8 @@ fn few_bits_and_alpha_of_gray_are_spread() {
     assert_eq!(eight(&photograph).row(2)[..4], [0, 85, 170, 255]);
 
     let form = Form { photometric: 1, bits: &[16, 16], ..Form::default() };
-    let samples: Vec<u16> = [300, 65_535].repeat(SIDE * SIDE);
-    assert_eq!(sixteen(&decoded(&tiff(&form, &[&samples[..]]))).pixel(1, 1), [300, 300, 300, 65_535]);
+    let samples: Vec<u16> = [300, 65_534].repeat(SIDE * SIDE);
+    assert_eq!(sixteen(&decoded(&tiff(&form, &[&samples[..]]))).pixel(1, 1), [300, 300, 300, 65_534]);
 }
 
 /// ExtraSamples says 1 of colors multiplied by alpha, and 2 of such that are not (TIFF 6.0, section 18).
