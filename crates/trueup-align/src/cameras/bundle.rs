@@ -212,10 +212,12 @@ impl BundleAdjustment<'_> {
         model: &IntrinsicsModel,
         huber_px: f64,
     ) -> Vec<PairTerm<LOCAL>> {
-        let mut terms = self.match_terms(cameras, model, huber_px);
-        if LOCAL == LENS_LOCAL {
-            terms.extend(self.curve_terms(cameras, huber_px));
+        let by_matches = || self.match_terms(cameras, model, huber_px);
+        if LOCAL != LENS_LOCAL {
+            return by_matches();
         }
+        let (mut terms, of_curves) = rayon::join(by_matches, || self.curve_terms(cameras, huber_px));
+        terms.extend(of_curves);
         terms
     }
 
@@ -243,7 +245,7 @@ impl BundleAdjustment<'_> {
     }
 
     /// What the matches cost.
-    pub(super) fn matches_cost(&self, parameters: &Parameters, huber_px: f64) -> f64 {
+    fn matches_cost(&self, parameters: &Parameters, huber_px: f64) -> f64 {
         let cameras = parameters.cameras(self.priors);
         let costs: Vec<f64> =
             self.observations.pairs.par_iter().map(|pair| pair_cost(&cameras, pair, huber_px)).collect();
@@ -251,23 +253,31 @@ impl BundleAdjustment<'_> {
     }
 
     /// What the edges cost.
-    pub(super) fn curves_cost(&self, parameters: &Parameters, huber_px: f64) -> f64 {
+    fn curves_cost(&self, parameters: &Parameters, huber_px: f64) -> f64 {
         let cameras = parameters.cameras(self.priors);
         let costs: Vec<f64> =
             self.curves.clusters.par_iter().map(|cluster| curve_cost(&cameras, cluster, huber_px)).collect();
         costs.iter().sum()
     }
 
+    /// What matches and edges cost.
+    fn costs(&self, parameters: &Parameters, huber_px: f64) -> [f64; 2] {
+        rayon::join(|| self.matches_cost(parameters, huber_px), || self.curves_cost(parameters, huber_px)).into()
+    }
+
     /// What matches and edges cost in the final pass, without what holds single unknowns.
     pub(super) fn fine_costs(&self, parameters: &Parameters) -> [f64; 2] {
-        [self.matches_cost(parameters, FINE_HUBER_PX), self.curves_cost(parameters, FINE_HUBER_PX)]
+        self.costs(parameters, FINE_HUBER_PX)
     }
 
     /// The sum of squares that is minimized.
     fn cost<const LOCAL: usize>(&self, parameters: &Parameters, model: &IntrinsicsModel, huber_px: f64) -> f64 {
         let prior: f64 = self.pulls(parameters, model).iter().map(|pull| pull.residual * pull.residual).sum();
-        let curves = if LOCAL == LENS_LOCAL { self.curves_cost(parameters, huber_px) } else { 0.0 };
-        self.matches_cost(parameters, huber_px) + curves + prior
+        if LOCAL != LENS_LOCAL {
+            return self.matches_cost(parameters, huber_px) + prior;
+        }
+        let [matches, curves] = self.costs(parameters, huber_px);
+        matches + curves + prior
     }
 
     /// Which unknowns meet.

@@ -71,6 +71,12 @@ struct Candidate {
     improbable: f64,
 }
 
+/// Candidates by the distance of their focal lengths from the matches' own.
+struct Sides {
+    shorter: Vec<Candidate>,
+    longer: Vec<Candidate>,
+}
+
 /// The cameras of `found`, whose unknowns are those of `model`, with the focal lengths that are most probable; `None` where matches are sure of
 /// theirs, or tell what is expected, and `lines` say nothing else.
 ///
@@ -88,10 +94,10 @@ pub(super) fn expected(
     let Some(search) = FocalSearch::new(problem, found, model, &expectation, context) else { return Ok(None) };
     let step = search.step;
     let own = Candidate { log_factor: 0.0, parameters: found.clone(), improbable: 0.0 };
-    let (mut shorter, mut longer) = (Vec::new(), Vec::new());
-    search.extend(&mut shorter, &own, -step)?;
-    search.extend(&mut longer, &own, step)?;
-    let is_sure = [&shorter, &longer].iter().filter_map(|side| side.last()).all(|one| one.improbable > SURE);
+    let mut sides = Sides { shorter: Vec::new(), longer: Vec::new() };
+    search.extend_both(&mut sides, &own, [step; 2])?;
+    let is_sure =
+        [&sides.shorter, &sides.longer].iter().filter_map(|side| side.last()).all(|one| one.improbable > SURE);
     // What is less sure would move nothing, and a parabola through steps tells less exactly where it is.
     if is_sure && expectation.sd > STEP {
         return Ok(None);
@@ -103,8 +109,8 @@ pub(super) fn expected(
         return Ok(None);
     }
     let beyond = if asks_lines { BEYOND } else { step };
-    search.extend(&mut shorter, &own, -expectation.off.max(0.0) - beyond)?;
-    search.extend(&mut longer, &own, (-expectation.off).max(0.0) + beyond)?;
+    search.extend_both(&mut sides, &own, [expectation.off, -expectation.off].map(|off| off.max(0.0) + beyond))?;
+    let Sides { shorter, longer } = sides;
     let candidates: Vec<Candidate> = shorter.into_iter().rev().chain([own]).chain(longer).collect();
     let by_lines = if asks_lines { told_by_lines(problem.priors, &candidates, step, lines) } else { None };
     if by_lines.is_none() && is_as_expected {
@@ -195,6 +201,14 @@ impl<'a> FocalSearch<'a> {
         };
         let rotations = nearby.rotations.iter().zip(&by).map(turned).collect();
         Parameters { focal_px, rotations, lenses: nearby.lenses.clone() }
+    }
+
+    /// Goes on to the sizes of `ends`, of the shorter side and the longer.
+    fn extend_both(&self, sides: &mut Sides, own: &Candidate, ends: [f64; 2]) -> Result<()> {
+        let Sides { shorter, longer } = sides;
+        let (shorter, longer) =
+            rayon::join(|| self.extend(shorter, own, -ends[0]), || self.extend(longer, own, ends[1]));
+        shorter.and(longer)
     }
 
     /// Goes on to `end` or a little beyond, in steps, on the side of `own`, the matches' own, that `side` holds.

@@ -195,7 +195,8 @@ impl LensSearch<'_> {
             };
             (0..free.len()).map(is_told).collect()
         };
-        Told { by_matches: by(Witness::Matches), by_edges: by(Witness::Edges) }
+        let (by_matches, by_edges) = rayon::join(|| by(Witness::Matches), || by(Witness::Edges));
+        Told { by_matches, by_edges }
     }
 
     /// How far lenses may move the corners of photographs that are taken for those of pinholes, working pixels, one standard
@@ -216,7 +217,7 @@ impl LensSearch<'_> {
             };
             (0..groups).map(of_group).collect()
         };
-        let (by_matches, by_edges) = (deviations(Witness::Matches), deviations(Witness::Edges));
+        let (by_matches, by_edges) = rayon::join(|| deviations(Witness::Matches), || deviations(Witness::Edges));
         let is_asked = |group: &usize| {
             let mut members = self.problem.priors.iter().zip(group_of).filter(|(_, of)| *of == group);
             members.all(|(prior, _)| prior.lens.is_none())

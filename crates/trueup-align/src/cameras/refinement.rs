@@ -87,13 +87,18 @@ pub(super) fn refine(
     let coarse = problem.minimize(start.clone(), &model, COARSE_HUBER_PX, context)?;
     let mut fine = problem.minimize(coarse, &model, FINE_HUBER_PX, context)?;
     let search = LensSearch { problem: &problem, precise: &for_lenses, kind: options.kind_of_lens(), context };
-    let with_lens = match per_picture_focal {
-        false => search.find(&fine, &CameraPrior::lens_groups(priors))?,
-        true => None,
+    let find_lens = || match per_picture_focal {
+        false => search.find(&fine, &CameraPrior::lens_groups(priors)),
+        true => Ok(None),
     };
+    let find_free = || {
+        let is_asked = options.focal_sharing == FocalSharing::Auto && priors.len() > 1;
+        is_asked.then(|| problem.minimize(fine.clone(), &own, COARSE_HUBER_PX, context)).transpose()
+    };
+    let (with_lens, free) = rayon::join(find_lens, find_free);
+    let (with_lens, free) = (with_lens?, free?);
     let mut unshared = None;
-    if options.focal_sharing == FocalSharing::Auto && priors.len() > 1 {
-        let free = problem.minimize(fine.clone(), &own, COARSE_HUBER_PX, context)?;
+    if let Some(free) = free {
         let zoomed = if problem.is_sound(&free) { zoom::found(&problem, &model, &fine, &free) } else { None };
         if let Some(zoomed) = zoomed {
             fine = problem.minimize(zoomed.start, &zoomed.model, COARSE_HUBER_PX, context)?;

@@ -4,8 +4,8 @@
 //! other. Where all do, as in a mesh that lines and pixels have not refined, the factor is complex: half of the entries of a real one, and half
 //! of the multiplications.
 //!
-//! A factor that is very large is in single precision: half of the memory. It then is a preconditioner, with which the solver comes to the
-//! same solution.
+//! A factor that is very large, or serves rounds of refinement, is in single precision: half of the memory and of the time. It then is a
+//! preconditioner, with which the solver comes to the same solution.
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::perm::{Perm, PermRef};
@@ -17,9 +17,9 @@ use faer::{Conj, c32, c64};
 
 use super::normal_equations::PlacedBlock;
 
-/// Real numbers of a factor beyond which it is in single precision: 134 MB of double ones. Meshes of some eighty photographs of the working
+/// Real numbers of a factor beyond which it is in single precision where its solution is wanted to rounding: 134 MB of double ones. Meshes of some eighty photographs of the working
 /// size have so many.
-const MOST_DOUBLES: usize = 1 << 24;
+pub(super) const MOST_DOUBLES: usize = 1 << 24;
 
 /// A lower triangle L with L L^H = A, as nearly as its numbers are precise.
 #[derive(Debug)]
@@ -42,19 +42,9 @@ pub(super) struct Triangle<T> {
 }
 
 impl VertexFactor {
-    /// The factor of the matrix of so many `vertices`, given its `blocks`, of which every vertex has one with itself; `None` if that is not
-    /// positive definite, or its factor does not fit into memory.
-    pub(super) fn new(vertices: usize, blocks: &[PlacedBlock]) -> Option<Self> {
-        Self::of_precision(vertices, blocks, MOST_DOUBLES)
-    }
-
-    /// The same in double precision, however large it is.
-    pub(super) fn in_double_precision(vertices: usize, blocks: &[PlacedBlock]) -> Option<Self> {
-        Self::of_precision(vertices, blocks, usize::MAX)
-    }
-
-    /// The same in single precision from more than so many real numbers on.
-    pub(super) fn of_precision(vertices: usize, blocks: &[PlacedBlock], most_doubles: usize) -> Option<Self> {
+    /// The factor of the matrix of so many `vertices`, given its `blocks`, of which every vertex has one with itself, in single precision if it has
+    /// more than `most_doubles` real numbers; `None` if that is not positive definite, or its factor does not fit into memory.
+    pub(super) fn new(vertices: usize, blocks: &[PlacedBlock], most_doubles: usize) -> Option<Self> {
         let order = elimination_order(vertices, blocks)?;
         if blocks.iter().all(|(_, _, block)| turns_and_scales(block)) {
             let (pattern, entries) = (complex_pattern(vertices, blocks)?, || complex_entries(blocks));
@@ -299,7 +289,7 @@ mod tests {
                 }
             }
         }
-        let factor = VertexFactor::of_precision(grid.len(), &blocks, most_doubles).expect("positive definite");
+        let factor = VertexFactor::new(grid.len(), &blocks, most_doubles).expect("positive definite");
         let found = factor.solve(&right);
         let is_real = matches!(factor, VertexFactor::Real(_) | VertexFactor::SingleReal(_));
         assert_eq!((factor.unknowns(), is_real, factor.is_single()), (wanted.len(), held_along, most_doubles == 0));

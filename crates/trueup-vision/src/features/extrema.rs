@@ -148,19 +148,29 @@ fn subtract_row<L: Lanes>(octave: &Octave, y: usize, padded: usize, recent: &mut
 #[inline(always)]
 fn column_extremes<L: Lanes>(recent: &[f32], differences: usize, padded: usize, extremes: &mut [f32]) {
     for x in (0..padded).step_by(L::COUNT) {
-        let three_rows = |level: usize| {
-            let [first, second, third] = [0, 1, 2].map(|row| L::load(recent, (row * differences + level) * padded + x));
-            (first.max(second).max(third), first.min(second).min(third))
-        };
-        let (mut below, mut here) = (three_rows(0), three_rows(1));
+        let row_stride = differences * padded;
+        let mut below = row_extremes::<L>(recent, x, row_stride);
+        let mut here = row_extremes::<L>(recent, padded + x, row_stride);
         for level in 1..differences - 1 {
-            let above = three_rows(level + 1);
+            let above = row_extremes::<L>(recent, (level + 1) * padded + x, row_stride);
             let at = 2 * (level - 1) * padded + x;
             below.0.max(here.0).max(above.0).store(extremes, at);
             below.1.min(here.1).min(above.1).store(extremes, at + padded);
             (below, here) = (here, above);
         }
     }
+}
+
+/// The greatest and least of three rows that lie `row_stride` samples apart, from sample `at` of the first one on.
+///
+/// A function, since a closure may be compiled by itself, without the vector instructions, and each of its operations
+/// is a call then.
+#[inline(always)]
+fn row_extremes<L: Lanes>(recent: &[f32], at: usize, row_stride: usize) -> (L, L) {
+    let first = L::load(recent, at);
+    let second = L::load(recent, at + row_stride);
+    let third = L::load(recent, at + 2 * row_stride);
+    (first.max(second).max(third), first.min(second).min(third))
 }
 
 /// Calls `found` with the columns, border excluded, where the center is as great or as small as all its neighbors.
