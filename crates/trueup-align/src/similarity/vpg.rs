@@ -37,6 +37,8 @@ const MAX_REFINEMENT_TOLERANCES: f64 = 2.0;
 /// Root mean square misorientation of the photographs' directions that is detection noise, degrees; beyond, the
 /// horizontal directions lose weight in the joint refinement.
 const ORDINARY_MISORIENTATION_DEG: f64 = 1.0;
+/// Photographs whose own directions must agree for lines of all together not to outvote them: one photograph agrees with itself.
+const MIN_AGREEING: usize = 2;
 /// Least share of the information on the vertical that makes lines its guide; with less they are one voice among others.
 const GUIDING_SHARE: f64 = 0.5;
 /// Largest standard deviation of the vertical at which lines guide, degrees: so few photographs have lines beyond that what their scatter says of
@@ -95,9 +97,8 @@ pub(super) fn guide(
     context.check_cancelled()?;
     let mut down = level.down;
     let (before, triads) = (guidance.clone(), scene.triads.clone());
-    let agreed = dominant.filter(|_| guidance.failed_clause.is_none());
-    let is_agreed = agreed.is_some();
-    if let Some(dominant) = agreed {
+    let is_agreed = dominant.is_some() && guidance.failed_clause.is_none();
+    if let Some(dominant) = dominant.clone().filter(|_| is_agreed) {
         match scene.solve_dominant(dominant, &mut guidance) {
             Ok(upright) => return Ok(Guided { guidance, upright: Some(upright), level: down }),
             Err(level) => down = level,
@@ -107,7 +108,7 @@ pub(super) fn guide(
     if let Some(pooled) = pooled.filter(|_| options.gate == GateMode::Full) {
         scene.triads = triads;
         let mut again = Guidance { failed_clause: guidance.failed_clause.clone(), ..before };
-        if let Some(dominant) = scene.pooled(&pooled, &mut again) {
+        if let Some(dominant) = scene.pooled(&pooled, dominant.as_ref(), &mut again) {
             match scene.solve_dominant(dominant, &mut again) {
                 Ok(upright) => return Ok(Guided { guidance: again, upright: Some(upright), level: down }),
                 // What refuses it says nothing of directions that photographs agreed on, whose own refusal stands.
@@ -212,8 +213,9 @@ impl<'a> SceneDirections<'a> {
         failed_clause(&evidence, self.options)
     }
 
-    /// The frame of the pooled search, if it stands out far enough: for where photographs agree on none, or on one that leaves the vertical open.
-    fn pooled(&self, pooled: &PooledFrames, guidance: &mut Guidance) -> Option<Dominant> {
+    /// The frame of the pooled search, if it stands out far enough: for where photographs agree on none, or on one that leaves the vertical open or
+    /// is refused.
+    fn pooled(&self, pooled: &PooledFrames, own: Option<&Dominant>, guidance: &mut Guidance) -> Option<Dominant> {
         if pooled.significance < GUIDING_SIGNIFICANCE {
             return None;
         }
@@ -227,12 +229,30 @@ impl<'a> SceneDirections<'a> {
         if self.by_level_lines(&down).is_some_and(|deviations| deviations > allowed) {
             return None;
         }
+        if own.is_some_and(|own| self.is_outdone(&frame, own)) {
+            return None;
+        }
         let residuals = self.triads.iter().map(|triad| triad.map(|triad| triad_residual(&frame, &triad))).collect();
         let dominant = Dominant { frame, residuals };
         guidance.pooled = true;
         guidance.inliers = self.inliers(&dominant);
         guidance.residuals.clone_from(&dominant.residuals);
         Some(dominant)
+    }
+
+    /// Whether segments fit another frame better that photographs agree on themselves and that the pooled search, which found `frame`, could not see:
+    /// its vertical is out of reach. Before a tower that fills photographs taken upward, what stands out within reach is a frame of the lines that
+    /// lie between its edges.
+    fn is_outdone(&self, frame: &Matrix3<f64>, own: &Dominant) -> bool {
+        let out_of_reach = self.vertical(&own.frame).angle(&self.level.down) > SEARCH_DEG.to_radians();
+        if !out_of_reach || self.inliers(own).len() < MIN_AGREEING {
+            return false;
+        }
+        let refined = self.vote.refine_frame(&own.frame, AxisWeights::new(0, 1.0, 1.0));
+        let down = self.vertical(frame);
+        let nearest = refined.column(column_near(&refined, &down)).into_owned();
+        let is_other = nearest.dot(&down).abs() < joint::TOLERANCE_DEG.to_radians().cos();
+        is_other && self.vote.fit(&refined) > self.vote.fit(frame)
     }
 
     /// How many deviations of what is known without lines `down` lies from there, where too few photographs show lines along it; level ones alone may be those of a slope.
