@@ -2,13 +2,11 @@
 
 use trueup_core::outline::Outline;
 
-use super::straight::Edge;
+use super::edge::{Edge, simplify};
 use super::{FEW_RAYS, LEAST_DEPTH, MARGIN_PX, MOST, Padding, RAYS, Ray, SAME_PX, Side, believable};
 
 /// Rays between a place and those beside it that it is in line with along a smooth curve.
 const SMOOTH_RAYS: usize = 4;
-/// Most that places of an outline may lie beside it when it is told by fewer, in working pixels.
-const SIMPLER_PX: f64 = 1.0;
 
 /// Padding that pictures of one size have in common: what taking the bend of one lens out of photographs leaves.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,18 +51,22 @@ impl CommonPadding {
         self.share_of_rays(same) >= MOST
     }
 
+    /// Whether there is padding at the start of a ray.
+    fn is_padded(&self, ray: usize) -> bool {
+        self.depths[ray] >= LEAST_DEPTH
+    }
+
     /// The share of the rays with padding for which something holds; 0 without any.
     fn share_of_rays(&self, holds: impl Fn(&usize) -> bool) -> f64 {
-        let padded = || (0..RAYS).filter(|&ray| self.depths[ray] >= LEAST_DEPTH);
+        let padded = || (0..RAYS).filter(|&ray| self.is_padded(ray));
         padded().filter(holds).count() as f64 / padded().count().max(1) as f64
     }
 
     fn is_smooth(&self, size: [usize; 2]) -> bool {
-        let is_padded = |ray: usize| self.depths[ray] >= LEAST_DEPTH;
         let place = |ray: usize| Ray::new(ray, size).at(f64::from(self.depths[ray]));
         let middle = size.map(|length| 0.5 * length as f64);
-        let mut inner = (0..RAYS).map(|ray| [(ray + RAYS - SMOOTH_RAYS) % RAYS, ray, (ray + SMOOTH_RAYS) % RAYS]);
-        let (all, smooth) = inner.by_ref().filter(|rays| rays.iter().all(|&ray| is_padded(ray))).fold(
+        let threes = (0..RAYS).map(|ray| [(ray + RAYS - SMOOTH_RAYS) % RAYS, ray, (ray + SMOOTH_RAYS) % RAYS]);
+        let (all, smooth) = threes.filter(|rays| rays.iter().all(|&ray| self.is_padded(ray))).fold(
             (0_usize, 0_usize),
             |(all, smooth), [before, ray, after]| {
                 let chord = Edge::through(place(before), place(after), middle);
@@ -76,14 +78,13 @@ impl CommonPadding {
 
     /// Whether padding lies at two opposite sides, and the photograph reaches the picture's border at two.
     fn is_opposite(&self, size: [usize; 2]) -> bool {
-        let padded = |ray: usize| self.depths[ray] >= LEAST_DEPTH;
         let few = |side: Side, is: &dyn Fn(usize) -> bool| {
             (0..RAYS).filter(|&ray| Ray::new(ray, size).side == side && is(ray)).take(FEW_RAYS / 2).count()
                 == FEW_RAYS / 2
         };
         let at_opposite =
             |is: &dyn Fn(usize) -> bool| Side::ALL.iter().any(|&side| few(side, is) && few(side.opposite(), is));
-        at_opposite(&padded) && at_opposite(&|ray| !padded(ray))
+        at_opposite(&|ray| self.is_padded(ray)) && at_opposite(&|ray| !self.is_padded(ray))
     }
 }
 
@@ -102,22 +103,4 @@ fn outlined(depths: &[u16], size: [usize; 2]) -> Option<Outline> {
     simplify(&other, &mut simpler);
     simpler.pop();
     believable(simpler, size)
-}
-
-/// Appends those of the `places` that tell the way from the first to the last one, but for the first: Ramer, Douglas and Peucker's.
-fn simplify(places: &[[f64; 2]], simpler: &mut Vec<[f64; 2]>) {
-    let [first, inner @ .., last] = places else { return };
-    let chord = Edge::through(*first, *last, *first);
-    let away = |place: &[f64; 2]| match chord {
-        Some(chord) => chord.beyond(*place).abs(),
-        None => (place[0] - first[0]).hypot(place[1] - first[1]),
-    };
-    let farthest = (0..inner.len()).max_by(|&one, &other| away(&inner[one]).total_cmp(&away(&inner[other])));
-    match farthest.filter(|&at| away(&inner[at]) > SIMPLER_PX) {
-        Some(at) => {
-            simplify(&places[..=at + 1], simpler);
-            simplify(&places[at + 1..], simpler);
-        }
-        None => simpler.push(*last),
-    }
 }

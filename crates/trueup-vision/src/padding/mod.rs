@@ -9,6 +9,7 @@ use trueup_core::statistics::median_of;
 use crate::border::{EVEN, STEP};
 
 mod common;
+mod edge;
 mod straight;
 #[cfg(test)]
 mod tests;
