@@ -1,18 +1,24 @@
 //! `trueup serve` as it is started and ended; what it serves is tested where it is made.
 
 use std::io::{BufRead, BufReader};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use crate::run::{Desk, finish, trueup};
 
-#[test]
-fn it_prints_an_address_and_leaves_nothing_behind() {
-    let desk = Desk::new();
-    let mut command = trueup(desk.path(), &["serve", "."]);
+/// `trueup serve` with its temporary files on the desk, and the first line that it prints.
+fn served(desk: &Desk, argument: &str) -> (Child, String) {
+    let mut command = trueup(desk.path(), &["serve", argument]);
     command.env("TMPDIR", desk.path()).stdout(Stdio::piped());
     let mut child = command.spawn().expect("the command starts");
     let mut line = String::new();
     BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("UTF-8");
+    (child, line)
+}
+
+#[test]
+fn it_prints_an_address_and_leaves_nothing_behind() {
+    let desk = Desk::new();
+    let (mut child, line) = served(&desk, ".");
     assert!(line.starts_with("Open http://127.0.0.1:") && line.contains("/?token="), "{line}");
     assert_eq!(desk.files().len(), 1, "its temporary files");
     let kill = format!("kill -INT {}", child.id());
@@ -26,11 +32,7 @@ fn it_prints_an_address_and_leaves_nothing_behind() {
 #[test]
 fn a_second_request_to_terminate_leaves_nothing_behind() {
     let desk = Desk::new();
-    let mut command = trueup(desk.path(), &["serve", "."]);
-    command.env("TMPDIR", desk.path()).stdout(Stdio::piped());
-    let mut child = command.spawn().expect("the command starts");
-    let mut line = String::new();
-    BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("UTF-8");
+    let (mut child, _) = served(&desk, ".");
     assert_eq!(desk.files().len(), 1, "its temporary files");
     // The second comes before the server looks whether it is to stop, which it does ten times a second; later ones find nobody.
     let kill = format!("for i in 1 2 3 4 5; do kill -TERM {}; sleep 0.02; done 2>/dev/null; true", child.id());
@@ -42,11 +44,7 @@ fn a_second_request_to_terminate_leaves_nothing_behind() {
 #[test]
 fn programs_are_told_the_address_as_json() {
     let desk = Desk::new();
-    let mut command = trueup(desk.path(), &["serve", "--json"]);
-    command.env("TMPDIR", desk.path()).stdout(Stdio::piped());
-    let mut child = command.spawn().expect("the command starts");
-    let mut line = String::new();
-    BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("UTF-8");
+    let (mut child, line) = served(&desk, "--json");
     let told: serde_json::Value = serde_json::from_str(&line).expect("JSON");
     assert_eq!((&told["format"], &told["version"]), (&"trueup-serve".into(), &1.into()));
     assert!(told["address"].as_str().is_some_and(|one| one.starts_with("http://127.0.0.1:")), "{told}");
