@@ -1,5 +1,6 @@
 //! Parts of a photograph that its photographer marked.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::inset::Inset;
@@ -23,6 +24,28 @@ impl Mask {
             for x in 0..width {
                 let bit = y * width + x;
                 words[bit / WORD_BITS] |= u64::from(marked(x, y)) << (bit % WORD_BITS);
+            }
+        }
+        Self { width, height, words }
+    }
+
+    /// A mask of `width` x `height` pixels, of whose row y those of the columns are marked that `marked` hands out for it; columns beyond the
+    /// width are passed over. Large parts are marked by the word.
+    pub fn from_rows<Columns: IntoIterator<Item = Range<usize>>>(
+        width: usize,
+        height: usize,
+        marked: impl Fn(usize) -> Columns,
+    ) -> Self {
+        let mut words = vec![0; (width * height).div_ceil(WORD_BITS)];
+        for y in 0..height {
+            for columns in marked(y) {
+                let (start, end) = (y * width + columns.start.min(width), y * width + columns.end.min(width));
+                let first = start / WORD_BITS;
+                let behind = end.div_ceil(WORD_BITS).max(first);
+                for (number, word) in words[first..behind].iter_mut().enumerate() {
+                    let bit = (first + number) * WORD_BITS;
+                    *word |= u64::MAX << start.saturating_sub(bit) & u64::MAX >> WORD_BITS.saturating_sub(end - bit);
+                }
             }
         }
         Self { width, height, words }
@@ -112,6 +135,16 @@ impl Masks {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Stretches that begin, end and lie within words, over several, without a pixel, and beyond the width.
+    #[test]
+    fn rows_are_marked_as_their_pixels_are() {
+        let rows =
+            [vec![0..1, 5..70, 149..400], vec![], vec![63..64, 64..65, 90..90, 100..150], vec![0..140, 145..150]];
+        let by_rows = Mask::from_rows(150, 4, |y| rows[y].clone());
+        assert_eq!(by_rows, Mask::from_fn(150, 4, |x, y| rows[y].iter().any(|columns| columns.contains(&x))));
+        assert_eq!(Mask::from_rows(0, 3, |_| [0..4, 5..6]), Mask::from_fn(0, 3, |_, _| true));
+    }
 
     #[test]
     fn marks_are_found_where_they_were_made_and_nowhere_else() {

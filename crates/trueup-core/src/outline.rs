@@ -59,8 +59,12 @@ impl Outline {
 
     /// What of a picture of `size` pixels lies beside the photograph.
     pub fn beside(&self, [width, height]: [usize; 2]) -> Mask {
-        let rows: Vec<Vec<Range<usize>>> = (0..height).map(|y| self.stretches(y, width)).collect();
-        Mask::from_fn(width, height, |x, y| !rows[y].iter().any(|inside| inside.contains(&x)))
+        Mask::from_rows(width, height, |y| {
+            let inside = self.stretches(y, width);
+            let starts = std::iter::once(0).chain(inside.iter().map(|stretch| stretch.end));
+            let ends = inside.iter().map(|stretch| stretch.start).chain([width]);
+            starts.zip(ends).map(|(start, end)| start..end).collect::<Vec<_>>()
+        })
     }
 
     /// The photograph in `picture`, with an alpha channel: what lies beside it is transparent.
