@@ -264,18 +264,39 @@ fn cut_pngs_tiffs_and_webps_are_refused() {
     }
 }
 
-/// Twelve bytes end a PNG; those before them are the sum of the pixels' chunk.
+/// Twelve bytes end a PNG; those before them are the sum of the pixels' chunk. A file may be cut between these or within the twelve.
 #[test]
 fn a_png_that_lacks_its_end_alone_is_read() {
     let folder = TempDir::new().expect("a temporary folder");
     for bytes in [rgb8().file(Container::Png), rgb16().file(Container::Png)] {
         let whole = photograph(&examine(write(&folder, "picture", &bytes))).expect("a photograph");
         let read = |missing: usize| photograph(&examine(write(&folder, "picture", &bytes[..bytes.len() - missing])));
-        assert_eq!(read(12).expect("all of its pixels"), whole);
+        for missing in 1..=12 {
+            assert_eq!(read(missing).expect("all of its pixels"), whole, "{missing} bytes");
+        }
         for missing in 13..30 {
             assert!(matches!(read(missing), Err(Error::Input { .. })), "{missing} bytes");
         }
     }
+}
+
+/// The sum of the pixels' chunk may end as the chunk behind it begins: with a zero.
+#[test]
+fn a_png_whose_last_sum_ends_with_a_zero_may_lack_its_end() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let lacking = (0..=u8::MAX).flat_map(|red| (0..8).map(move |green| [red, green, 0])).find_map(|color| {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 16, 16);
+        encoder.set_color(png::ColorType::Rgb);
+        let mut writer = encoder.write_header().expect("a header");
+        writer.write_image_data(&color.repeat(16 * 16)).expect("pixels");
+        writer.finish().expect("an end");
+        bytes.truncate(bytes.len() - 12);
+        (bytes.last() == Some(&0)).then_some((bytes, color))
+    });
+    let (bytes, color) = lacking.expect("one in 256 of them");
+    let read = photograph(&examine(write(&folder, "picture", &bytes))).expect("all of its pixels");
+    assert!(matches!(read, Photograph::Eight(read) if read.data() == color.repeat(16 * 16)));
 }
 
 #[test]

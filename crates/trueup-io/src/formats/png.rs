@@ -64,12 +64,54 @@ const XMP_KEYWORD: &str = "XML:com.adobe.xmp";
 /// The chunk that ends a PNG: no data, its name, and its sum (W3C PNG 11.2.5).
 const END: &[u8] = b"\0\0\0\0IEND\xae\x42\x60\x82";
 
-/// A file with the chunk behind it that ends a PNG. One that was cut right behind its last pixels has all of them; of one that was cut
-/// within them the chunk makes nothing whole, and of a whole file it is never read.
+/// Bytes of the signature (W3C PNG 5.2), and of a chunk beside its data: length, name and sum (5.3).
+const SIGNATURE_BYTES: u64 = 8;
+const CHUNK_BYTES: u64 = 12;
+
+/// A file with the chunk behind it that ends a PNG, or what it lacks of it. One that was cut right behind its last pixels, or within that
+/// chunk, has all of them; of one that was cut within them the chunk makes nothing whole, and of a whole file it is never read.
 struct Ended<'a> {
     input: &'a mut Input,
-    /// What is left of the chunk.
+    /// What the file may lack of the chunk.
+    missing: &'static [u8],
+    /// What is left of that.
     rest: &'static [u8],
+}
+
+impl<'a> Ended<'a> {
+    /// The file from its start on.
+    ///
+    /// # Errors
+    /// Those of reading.
+    fn new(input: &'a mut Input) -> IoResult<Self> {
+        let missing = &END[begun_end(input)?..];
+        input.rewind()?;
+        Ok(Self { input, missing, rest: missing })
+    }
+}
+
+/// How many bytes a file has of the chunk that ends a PNG, where it was cut within it; 0 otherwise. Chunks are followed, since the sum of
+/// the one before may end as this one begins.
+fn begun_end(input: &mut Input) -> IoResult<usize> {
+    let length = input.seek(SeekFrom::End(0))?;
+    let tail_start = length.saturating_sub(END.len() as u64);
+    let mut tail = Vec::with_capacity(END.len());
+    input.seek(SeekFrom::Start(tail_start))?;
+    input.read_to_end(&mut tail)?;
+    // Of most files: whole, or cut elsewhere.
+    if tail == END || !(1..END.len()).any(|begun| tail.ends_with(&END[..begun])) {
+        return Ok(0);
+    }
+    let mut start = SIGNATURE_BYTES;
+    while length.saturating_sub(start) >= CHUNK_BYTES {
+        input.seek(SeekFrom::Start(start))?;
+        let mut data_bytes = [0; 4];
+        input.read_exact(&mut data_bytes)?;
+        start += CHUNK_BYTES + u64::from(u32::from_be_bytes(data_bytes));
+    }
+    // Fewer bytes than any chunk has.
+    let begun = tail.get(start.saturating_sub(tail_start) as usize..).unwrap_or_default();
+    Ok(if start <= length && END.starts_with(begun) { begun.len() } else { 0 })
 }
 
 impl Read for Ended<'_> {
@@ -96,7 +138,7 @@ impl BufRead for Ended<'_> {
 
 impl Seek for Ended<'_> {
     fn seek(&mut self, place: SeekFrom) -> IoResult<u64> {
-        self.rest = END;
+        self.rest = self.missing;
         self.input.seek(place)
     }
 }
@@ -160,7 +202,7 @@ fn exif(input: &mut Input) -> Option<ExifFields> {
 fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
     let failed = |error: DecodingError| damaged(source, error);
     let limit = usize::try_from(decoding_limit(source)).unwrap_or(usize::MAX);
-    let input = Ended { input: &mut input, rest: END };
+    let input = Ended::new(&mut input).map_err(|error| failed(error.into()))?;
     let mut reader = decoder(input, limit, false).map_err(failed)?;
     let (width, height) = reader.info().size();
     let (width, height) = (width as usize, height as usize);
