@@ -35,7 +35,7 @@ use crate::color::InSrgb;
 use crate::format::Writer;
 
 use destination::{check_sides, writing_to};
-use pending::PendingFile;
+use pending::{Durability, PendingFile};
 
 pub use crate::formats::written_extensions;
 pub use background::Background;
@@ -125,12 +125,25 @@ pub fn check_format(path: &Path, options: &OutputOptions) -> Result<()> {
     writing_to(path, options).map(drop)
 }
 
-/// Writes a file that appears complete or not at all; for reports and project files.
+/// Writes a file that appears complete or not at all, also where the computer loses power; for reports and project files.
 ///
 /// # Errors
 /// [`Error::Input`] if the folder does not exist or takes no files, [`Error::Io`] if the operating system refuses.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut pending = PendingFile::create(path)?;
+    write_bytes(path, bytes, Durability::Whole)
+}
+
+/// The same without waiting for the disk: a computer that loses power may leave the file empty or half. For what is looked through when it is
+/// read, and can be made again.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn write_regained(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_bytes(path, bytes, Durability::Regained)
+}
+
+fn write_bytes(path: &Path, bytes: &[u8], durability: Durability) -> Result<()> {
+    let mut pending = PendingFile::create(path)?.with_durability(durability);
     std::io::Write::write_all(pending.file(), bytes).map_err(|error| Error::io("writing", &pending.place(), error))?;
     pending.commit().map(drop)
 }

@@ -21,6 +21,16 @@ const NEW_FILE: u32 = 0o666;
 pub(crate) struct PendingFile {
     target: PathBuf,
     way: Way,
+    durability: Durability,
+}
+
+/// What of a file is sure to be there when the computer loses power just after the file has its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Durability {
+    /// All of it: it is on the disk before it has its name, where another one may have been.
+    Whole,
+    /// Perhaps nothing, at once: for what is looked through when it is read, and can be made again.
+    Regained,
 }
 
 /// How what was written comes to its target.
@@ -61,14 +71,20 @@ impl PendingFile {
         let make = || builder.tempfile_in(folder).map_err(|error| takes_nothing(folder, &error));
         let (temporary, _entry) = UNFINISHED.begin(make, NamedTempFile::path)?;
         mark_in_use(temporary.as_file());
-        Ok(Self { target, way: Way::Renamed { temporary, _entry } })
+        Ok(Self { target, way: Way::Renamed { temporary, _entry }, durability: Durability::Whole })
+    }
+
+    /// The same file, of which so much is sure.
+    #[must_use]
+    pub(crate) fn with_durability(self, durability: Durability) -> Self {
+        Self { durability, ..self }
     }
 
     fn create_through(path: &Path) -> Result<Self> {
         refuse_disk(path)?;
         let folder = std::env::temp_dir();
         let kept = tempfile::tempfile_in(&folder).map_err(|error| takes_nothing(&folder, &error))?;
-        Ok(Self { target: path.to_owned(), way: Way::Through(kept) })
+        Ok(Self { target: path.to_owned(), way: Way::Through(kept), durability: Durability::Whole })
     }
 
     /// The file to write to.
@@ -90,11 +106,14 @@ impl PendingFile {
 
     /// Gives the file its name, or passes it on; returns its length in bytes.
     pub(crate) fn commit(self) -> Result<u64> {
-        let Self { target, way } = self;
+        let Self { target, way, durability } = self;
         let failed = |error| Error::io("writing", &target, error);
         match way {
             Way::Renamed { temporary, _entry } => {
                 let length = temporary.as_file().metadata().map_err(failed)?.len();
+                if durability == Durability::Whole {
+                    sync(temporary.as_file()).map_err(failed)?;
+                }
                 UNFINISHED.complete(|| temporary.persist(&target).map_err(|error| failed(error.error)))?;
                 Ok(length)
             }
@@ -103,6 +122,14 @@ impl PendingFile {
                 kept.rewind().and_then(|()| std::io::copy(&mut kept, &mut into)).map_err(failed)
             }
         }
+    }
+}
+
+/// Has the disk hold what was written to a file. Some file systems cannot be asked for that, which is no reason to have no file.
+fn sync(file: &File) -> std::io::Result<()> {
+    match file.sync_all() {
+        Err(error) if matches!(error.kind(), ErrorKind::Unsupported | ErrorKind::InvalidInput) => Ok(()),
+        done => done,
     }
 }
 
@@ -181,6 +208,15 @@ mod tests {
         let desk = tempfile::tempdir().expect("a folder");
         let file = desk.path().join("pano.jpg");
         assert_eq!(PendingFile::create(&file).expect("possible").place(), resolved(&file));
+    }
+
+    /// Linux refuses to sync a device of characters.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_cannot_be_synced_is_no_error() {
+        let device = File::options().write(true).open("/dev/null").expect("it is there");
+        assert_eq!(device.sync_all().expect_err("it is no file").kind(), ErrorKind::InvalidInput);
+        sync(&device).expect("nothing is lost");
     }
 
     #[test]

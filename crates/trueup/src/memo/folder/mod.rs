@@ -136,7 +136,7 @@ impl PhotographCache {
     pub(crate) fn store<T: Serialize>(&self, kind: Kind, key: &Key, result: &T) {
         let written = rmp_serde::to_vec_named(result).map_err(|error| error.to_string()).and_then(|content| {
             let bytes = entry::with_checksum(&content);
-            encode::write_atomically(&self.path(kind, key), &bytes).map_err(|error| error.to_string())
+            encode::write_regained(&self.path(kind, key), &bytes).map_err(|error| error.to_string())
         });
         if let Err(reason) = written {
             self.trouble("cache-not-written", &format!("a result could not be kept: {reason}"));
