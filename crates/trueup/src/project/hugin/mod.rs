@@ -16,6 +16,7 @@ use trueup_core::{Error, Result};
 
 use super::record::{ImageRecord, Project};
 
+mod masks;
 mod parse;
 mod read;
 
@@ -52,7 +53,7 @@ impl Attitude {
 /// equirectangular projection at the pixel scale of the photographs' middles.
 ///
 /// Images are named by the paths in the record and described as they are stored in their files: Hugin's renderer knows no
-/// EXIF orientation, which goes into the roll. What the mesh does beyond the cameras has no place in the format, nor have
+/// EXIF orientation, which goes into the roll. What lies beside an outline is masked. What the mesh does beyond the cameras has no place in the format, nor have
 /// the matches, which the record does not hold: `cpfind` of Hugin finds such again.
 ///
 /// # Errors
@@ -69,12 +70,14 @@ pub fn hugin_project(project: &Project) -> Result<String> {
         ));
     }
     let mut lines = String::new();
+    let mut masks = String::new();
     let mut focal_sum = 0.0;
-    for image in project.used_images() {
+    for (number, image) in project.used_images().enumerate() {
         let (Some(rotation), Some(focal_px)) = (image.level_rotation(), image.focal_px) else { return Err(missing()) };
         focal_sum += focal_px;
         // Writing to a string cannot fail.
         let _ = writeln!(lines, "{}", image_line(image, &matrix_from_rows(rotation), focal_px)?);
+        masks.push_str(&masks::lines(number, image));
     }
     let count = project.used();
     if count == 0 {
@@ -87,7 +90,7 @@ pub fn hugin_project(project: &Project) -> Result<String> {
         env!("CARGO_PKG_VERSION"),
         2.0 * height,
     );
-    Ok(format!("{header}{lines}v\n"))
+    Ok(format!("{header}{lines}v\n{masks}"))
 }
 
 fn image_line(image: &ImageRecord, camera_from_level: &Matrix3<f64>, focal_px: f64) -> Result<String> {
