@@ -32,6 +32,18 @@ fn files_in(desk: &Desk, folder: &str) -> Vec<String> {
     names
 }
 
+/// Of one photograph all methods make the same, which says nothing of them; nor does one beside a file that is none.
+#[test]
+fn a_single_photograph_is_refused_with_what_to_do() {
+    let desk = street_desk();
+    desk.put("text.jpg", "no picture");
+    for photographs in [&["a.jpg"][..], &["a.jpg", "text.jpg"]] {
+        let run = finish(trueup(desk.path(), &[&["compare", "-o", "out"], photographs].concat()));
+        run.expect_failure(1, &["a.jpg: there is only one photograph to use", "at least two overlapping photographs"]);
+        assert!(!desk.join("out").exists());
+    }
+}
+
 #[test]
 fn every_method_is_made_or_says_why_not() {
     let desk = street_desk();

@@ -91,7 +91,7 @@ impl CompareJob {
     /// comparison of the same name is replaced then, any other folder is refused before work starts.
     ///
     /// # Errors
-    /// Those of [`Stitcher::match_photographs`] and of writing; [`Error::Input`] for entries, rankings, a truth or a folder
+    /// Those of [`Stitcher::match_photographs`] and of writing; [`Error::Input`] for a single photograph, and for entries, rankings, a truth or a folder
     /// that cannot be; the first entry's error if all are refused.
     pub fn run(&self, options: &StitchOptions, context: &StageContext, pages: &MakePages) -> Result<Comparison> {
         options.validate()?;
@@ -158,6 +158,12 @@ impl CompareJob {
             .transpose()?;
         let stitcher = Stitcher::new(options, context).with_cache(cache.as_ref());
         let set = stitcher.match_photographs(&inputs)?.remembering();
+        if let [only] = set.images() {
+            let reason =
+                "there is only one photograph to use, and methods differ in how they fit several to each other";
+            let hint = "Name at least two overlapping photographs, or a folder that holds them.";
+            return Err(Error::input(&only.name, reason, hint));
+        }
         let pixels: f64 = set.images().iter().map(|image| (image.width * image.height) as f64).sum();
         let options = &self.at_page_size(options, pixels);
         let overlap_scale = overlaps::common_scale(pixels, options.run.measures.canvas_pixels);
