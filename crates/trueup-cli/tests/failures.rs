@@ -50,6 +50,24 @@ fn a_photograph_of_eight_pixels() {
         .expect_failure(1, &["dot.jpg: 8 x 8 px are too few to stitch, each side needs 16"]);
 }
 
+/// A folder of photographs, one of whose names is none of text, is stitched; composed again, that one is found in its folder.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_project_of_a_name_that_is_not_utf8_says_what_to_do() {
+    use std::os::unix::ffi::OsStrExt;
+    let desk = street_desk();
+    let folder = desk.join("in");
+    std::fs::create_dir(&folder).expect("a folder");
+    std::fs::rename(desk.join("a.jpg"), folder.join(std::ffi::OsStr::from_bytes(b"a\xff.jpg"))).expect("moved");
+    std::fs::rename(desk.join("b.jpg"), folder.join("b.jpg")).expect("moved");
+    let stitch = ["stitch", "in", "-o", "p.jpg", "--project", "p.json", "--set", "canvas.scale=0.3"];
+    finish(trueup(desk.path(), &stitch)).expect_success();
+    let compose = ["compose", "p.json", "-o", "again.jpg"];
+    let said = "in/a\u{fffd}.jpg: photograph not found: its name is no UTF-8";
+    finish(trueup(desk.path(), &compose)).expect_failure(1, &[said, "after --photos"]);
+    finish(trueup(desk.path(), &[&compose[..], &["--photos", "in"]].concat())).expect_success();
+}
+
 /// Beside the program's own photographs lies one whose name is none of text: a pattern and its folder find the others; named, it is named in the answer.
 #[cfg(target_os = "linux")]
 #[test]

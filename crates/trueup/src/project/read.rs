@@ -267,6 +267,15 @@ pub(crate) fn find_file(
     context: &StageContext,
 ) -> Result<SourceImage> {
     let Some(path) = place_of(recorded, project_folder) else {
+        // What a name has in place of bytes that are no UTF-8: no file is called so.
+        if recorded.contains(char::REPLACEMENT_CHARACTER) {
+            let reason = "photograph not found: its name is no UTF-8, and a project cannot hold such a name";
+            return Err(Error::input(
+                recorded,
+                reason,
+                "Give the folder that holds it, or rename it and stitch again.",
+            ));
+        }
         return Err(Error::input(
             recorded,
             "photograph not found, neither here nor beside the project file",
