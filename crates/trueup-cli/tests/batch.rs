@@ -118,6 +118,28 @@ fn a_set_that_can_have_no_folder_stops_nothing() {
     assert!(table.contains("\"batch.csv\",\"failed\""), "{table}");
 }
 
+/// A site in the folder for the panoramas, a table, lines of another program: nothing is written beside them, either.
+#[test]
+fn files_of_all_sets_that_no_batch_has_written_are_never_replaced() {
+    let desk = tree(0);
+    std::fs::create_dir(desk.join("out")).expect("a folder");
+    for name in ["index.html", "batch.csv", "batch.jsonl"] {
+        let file = format!("out/{name}");
+        desk.put(&file, "<html>mine");
+        let said = format!("{file}: a file of this name is there that no batch has written");
+        finish(batch(&desk, &[])).expect_failure(1, &[&said, "Move it away, or choose another folder"]);
+        assert_eq!(desk.read(&file), b"<html>mine");
+        assert_eq!(files(&desk.join("out")), [name], "nothing beside it");
+        std::fs::remove_file(desk.join(&file)).expect("removed");
+    }
+    // Its own are known again, and what is empty has nothing to lose.
+    for _ in 0..2 {
+        desk.put("out/batch.csv", "");
+        assert_eq!(finish(batch(&desk, &[])).status, 3, "the bad set");
+    }
+    assert!(desk.read("out/batch.csv").starts_with(b"\"set\""));
+}
+
 #[test]
 fn a_folder_for_panoramas_that_cannot_be_is_refused_with_what_to_do() {
     let desk = tree(1);

@@ -22,7 +22,8 @@ const SUM_UP_EVERY: Duration = Duration::from_secs(60);
 /// that is stopped, the files of all sets are written into the folder `output` of the batch.
 ///
 /// # Errors
-/// Those of [`Batch::run`] and of writing these files; what `tell` returns.
+/// Those of [`Batch::run`] and of writing these files; what `tell` returns; [`Error::Input`] where one of these files is there that no batch
+/// has written.
 pub fn run_batch<E: From<Error> + Send>(
     batch: &Batch,
     output: &Path,
@@ -30,6 +31,7 @@ pub fn run_batch<E: From<Error> + Send>(
     tell: &(dyn Fn(&SetRecord) -> Result<(), E> + Sync),
     context: &StageContext,
 ) -> Result<(), E> {
+    refuse_over_others(output)?;
     let files = Files { batch, output, summed_up: Mutex::default() };
     let heard = |record: &SetRecord| -> Result<(), E> {
         tell(record)?;
@@ -40,6 +42,13 @@ pub fn run_batch<E: From<Error> + Send>(
     let summed_up = if output.is_dir() { files.sum_up_all() } else { Ok(()) };
     outcome?;
     Ok(summed_up?)
+}
+
+/// Refuses files that are called as those of all sets and that no batch has written, before work starts.
+fn refuse_over_others(output: &Path) -> Result<(), Error> {
+    Batch::refuse_over(&output.join(LINES), lines::is_own)?;
+    Batch::refuse_over(&output.join(TABLE), table::is_own)?;
+    Batch::refuse_over(&output.join(PAGE), page::is_own)
 }
 
 /// The files of all sets.

@@ -39,6 +39,11 @@ fn line(set: &str, status: &str, photographs: Value, more: Value) -> String {
     format!("{line}\n")
 }
 
+/// Whether a file that begins so holds such lines.
+pub(super) fn is_own(start: &[u8]) -> bool {
+    String::from_utf8_lossy(start).contains(&format!("\"format\":\"{FORMAT}\""))
+}
+
 /// The same for people.
 pub(super) fn words(record: &SetRecord) -> String {
     let set = one_line(&record.set);

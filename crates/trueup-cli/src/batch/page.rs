@@ -6,6 +6,8 @@ use trueup::{Error, SetOutcome, SetRecord};
 
 /// The page. Its name in the environment ends in `.html`, by which values are escaped.
 const TEMPLATE: &str = include_str!("index.html");
+/// The title of such a page, which ends what is the same of all of them.
+const TITLE: &str = "<title>Panoramas</title>";
 
 /// The page of the sets that are done, of `planned` in all.
 ///
@@ -21,6 +23,12 @@ pub(super) fn text(records: &[SetRecord], planned: usize) -> Result<String, Erro
     let mut environment = Environment::new();
     environment.add_template("index.html", TEMPLATE).map_err(wrong)?;
     environment.get_template("index.html").and_then(|page| page.render(minijinja::value::Serde(values))).map_err(wrong)
+}
+
+/// Whether a file that begins so is such a page.
+pub(super) fn is_own(start: &[u8]) -> bool {
+    let end = TEMPLATE.find(TITLE).map_or(TEMPLATE.len(), |at| at + TITLE.len());
+    start.starts_with(&TEMPLATE.as_bytes()[..end])
 }
 
 fn set(record: &SetRecord) -> Value {

@@ -23,6 +23,8 @@ const COLUMNS: [&str; 14] = [
 /// The positions of those that every set has.
 const ERROR: usize = COLUMNS.len() - 2;
 const OUTDATED: usize = COLUMNS.len() - 1;
+/// So many of the first columns tell such a table from others.
+const KNOWN_BY: usize = 4;
 /// What parts the files in the last column.
 const BETWEEN_FILES: &str = "; ";
 
@@ -34,6 +36,12 @@ pub(super) fn text(records: &[SetRecord]) -> String {
     let head = COLUMNS.map(str::to_owned);
     let rows = std::iter::once(head).chain(records.iter().flat_map(rows));
     rows.map(|row| row.map(|field| quoted(&field)).join(",") + "\r\n").collect()
+}
+
+/// Whether a file that begins so is such a table, whatever its last columns.
+pub(super) fn is_own(start: &[u8]) -> bool {
+    let first = COLUMNS.iter().take(KNOWN_BY).map(|column| quoted(column));
+    start.starts_with(first.collect::<Vec<_>>().join(",").as_bytes())
 }
 
 fn rows(record: &SetRecord) -> Vec<[String; COLUMNS.len()]> {

@@ -1,13 +1,20 @@
 //! Who works at a set: one program at a time, on this machine or on another that shares the folder.
 
 use std::fs::{File, TryLockError};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use trueup_core::{Error, Result};
 
+use super::foreign;
+
 /// The file in a set's folder that is there while a program works at it, and after one that was killed at it.
 pub(super) const FILE: &str = "at-work";
+
+/// The byte in it for every beginning.
+const BEGINNING: u8 = b'.';
+/// Bytes of a file of that name that are looked at: more beginnings than any set has.
+const MOST_LOOKED_AT: u64 = 4096;
 
 /// A set that this program works at. Nobody else does while it lives: the file is locked, and a lock goes with the program that
 /// holds it, however it ends.
@@ -27,12 +34,12 @@ impl Claim {
     /// Where the file system knows no locks, every program takes every set: work is done twice then, and comes to the same.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Io`]; [`Error::Input`] if a file of that name is there that no batch has written.
     pub(super) fn take(folder: &Path) -> Result<Option<Self>> {
         std::fs::create_dir_all(folder).map_err(|error| Error::io("making", folder, error))?;
         let path = folder.join(FILE);
         let wrong = |error| Error::io("writing", &path, error);
-        let mut file = File::options().create(true).append(true).open(&path).map_err(wrong)?;
+        let mut file = File::options().create(true).read(true).append(true).open(&path).map_err(wrong)?;
         let is_locked = match file.try_lock() {
             Ok(()) => true,
             Err(TryLockError::WouldBlock) => return Ok(None),
@@ -42,9 +49,13 @@ impl Claim {
         if !is_at(&file, &path) {
             return Ok(None);
         }
-        // A byte for every beginning.
+        let mut begun = Vec::new();
+        (&file).take(MOST_LOOKED_AT).read_to_end(&mut begun).map_err(wrong)?;
+        if begun.iter().any(|&byte| byte != BEGINNING) {
+            return Err(foreign::refusal(&path));
+        }
         let unended = file.metadata().map_err(wrong)?.len();
-        if let Err(error) = file.write_all(b".") {
+        if let Err(error) = file.write_all(&[BEGINNING]) {
             // Nothing is to tell of work that never began.
             if is_locked && unended == 0 {
                 drop(std::fs::remove_file(&path));

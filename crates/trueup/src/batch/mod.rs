@@ -2,6 +2,7 @@
 //! machines, and never stopped by one bad set.
 
 mod claim;
+mod foreign;
 mod names;
 mod queue;
 mod record;
@@ -9,7 +10,7 @@ mod sets;
 mod work;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use trueup_core::{Error, Result, StageContext};
@@ -107,6 +108,15 @@ impl Batch {
     /// The files of all sets. A set of one of these names fails: its folder would lie where the file does.
     pub const FILES: [&str; 3] = [Self::LINES, Self::TABLE, Self::PAGE];
 
+    /// Refuses a file at `path`, where the batch writes one of its own, that no batch has written, and which `is_own` does not know by its
+    /// first bytes; an empty one has nothing to lose.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for such a file, [`Error::Io`] if it cannot be read.
+    pub fn refuse_over(path: &Path, is_own: impl FnOnce(&[u8]) -> bool) -> Result<()> {
+        foreign::refuse_over(path, is_own)
+    }
+
     /// Finds the sets of a job. A folder that cannot be read is passed over with the warning `folder-unreadable`, a photograph
     /// whose name is no UTF-8 with `photograph-name-unreadable`, photographs where the panoramas are to be with
     /// `output-holds-photographs`.
@@ -171,7 +181,8 @@ impl Batch {
     /// A set is done when its record is there. It is done anew only if its photographs, the options that decide panoramas, the
     /// extension or the version of this program have changed, a file of its panoramas is gone or was cut short, a photograph that
     /// could not be read can be read by now, it failed for a reason that may pass, or [`BatchJob::retry`] asks for it. A set whose
-    /// folder takes no record failed, as long as this `Batch` lives; the next run tries it again. Where the file system knows no
+    /// folder takes no record, or holds a file that no batch has written where one would come to lie, failed, as long as this `Batch` lives; the
+    /// next run tries it again. Where the file system knows no
     /// locks, the warning `folder-without-locks` says so.
     ///
     /// # Errors

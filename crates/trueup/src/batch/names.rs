@@ -53,7 +53,7 @@ pub(super) fn is_of_set(name: &str) -> bool {
 }
 
 /// Whether a panorama of a set may be called so.
-fn is_panorama(name: &str) -> bool {
+pub(super) fn is_panorama(name: &str) -> bool {
     let path = Path::new(name);
     let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
     is_numbered(stem, PANORAMA) && encode::check_format(path, &OutputOptions::default()).is_ok()

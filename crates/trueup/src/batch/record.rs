@@ -101,6 +101,11 @@ impl SetRecord {
         }
     }
 
+    /// Whether a panorama is one of the set's, of now or of an earlier attempt; `file` is its path below the folder of the batch.
+    pub(super) fn lists(&self, file: &str) -> bool {
+        self.panoramas().iter().any(|one| one["panorama"] == file) || self.outdated.iter().any(|one| one == file)
+    }
+
     /// The record in a set's folder; `None` if there is none, or it is no whole one.
     pub(super) fn read(folder: &Path) -> Option<Self> {
         serde_json::from_slice(&std::fs::read(folder.join(FILE)).ok()?).ok()

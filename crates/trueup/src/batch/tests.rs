@@ -232,6 +232,41 @@ fn a_set_that_can_have_no_folder_fails_alone() {
     assert!(out.join("b/panorama.jpg").is_file() && !out.join("batch.csv").exists());
 }
 
+/// Files of another program, or of a person, in the folder of a set: before it was ever made, and afterwards.
+#[test]
+fn what_no_batch_has_written_in_the_folder_of_a_set_is_never_replaced() {
+    let desk = tree(&["a"]);
+    let folder = desk.path().join("out/a");
+    fs::create_dir_all(&folder).expect("a folder");
+    let refused = |job: BatchJob, name: &str| {
+        fs::write(folder.join(name), "mine").expect("written");
+        let context = StageContext::default();
+        let batch = Batch::find(job, &context).expect("a set");
+        batch.run(&options(), &|_| Ok::<(), Error>(()), &context).expect("a set that fails stops nothing");
+        let record = batch.record_of(0).expect("what became of it");
+        let SetOutcome::Failed { error, hint, may_pass } = record.outcome else { panic!("{name} was written over") };
+        assert!(error.contains(name) && error.contains("that no batch has written"), "{error}");
+        assert!(hint.contains("Move it away") && may_pass, "{hint}");
+        assert_eq!(fs::read(folder.join(name)).expect("readable"), b"mine");
+        fs::remove_file(folder.join(name)).expect("removed");
+    };
+    for name in ["panorama.jpg", "panorama-2.json", "thumbnail.jpg", "record.json", "at-work"] {
+        refused(job(&desk), name);
+        assert_eq!(fs::read_dir(&folder).expect("readable").count(), 0, "{name}: nothing beside it");
+    }
+    assert_eq!(run(job(&desk), &options()).expect("done"), ["a"]);
+    // A photograph that has changed asks for the set again.
+    fs::copy(desk.path().join("in/a/02.jpg"), desk.path().join("in/a/03.jpg")).expect("copied");
+    refused(job(&desk), "panorama-7.jpg");
+    // What would not be written over may lie there.
+    fs::write(folder.join("panorama.txt"), "mine").expect("written");
+    assert_eq!(run(job(&desk), &options()).expect("done"), ["a"]);
+    assert_eq!(fs::read(folder.join("panorama.txt")).expect("readable"), b"mine");
+    // A record that was taken away asks for the set again, too.
+    fs::remove_file(folder.join("record.json")).expect("removed");
+    assert_eq!(run(job(&desk), &options()).expect("done"), ["a"]);
+}
+
 #[test]
 fn a_panorama_that_was_cut_short_is_made_again() {
     let desk = tree(&["a"]);

@@ -17,6 +17,7 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode;
 
 use super::claim::Claim;
+use super::foreign;
 use super::names::{self, PANORAMA};
 use super::record::{PHOTOGRAPHS, SetOutcome, SetRecord, UNREADABLE, below, milliseconds, now_ms};
 use super::{Batch, PhotographsOfFolder};
@@ -130,7 +131,8 @@ impl<'a> Work<'a> {
     /// Does the set at this position in its folder, if it is to be done and nobody else is at it.
     ///
     /// # Errors
-    /// [`Error::Cancelled`], and those of making the folder and keeping the record.
+    /// [`Error::Cancelled`], those of making the folder and keeping the record, and [`Error::Input`] for a file that no batch has written
+    /// where one of its own would come to lie.
     fn attempt_in_folder(&self, position: usize, context: &StageContext) -> Result<Attempt> {
         let (set, folder) = (&self.batch.sets[position], self.folder_of(position));
         if self.is_done(position) && !Claim::is_begun(&folder) {
@@ -144,6 +146,13 @@ impl<'a> Work<'a> {
         }
         if !claim.is_locked && !self.told_of_locks.swap(true, Ordering::Relaxed) {
             context.report(without_locks(&self.batch.job.output));
+        }
+        let is_new = claim.unended == 0;
+        if let Some(file) =
+            foreign::in_set(&folder, &self.batch.job.output, &self.batch.job.extension).filter(|_| is_new)
+        {
+            claim.release();
+            return Err(foreign::refusal(&file));
         }
         // As the photographs are before they are read: what changes under way is to be seen next time.
         let made_of = self.made_of(set, |_| true);
