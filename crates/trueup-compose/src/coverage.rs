@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use trueup_core::stretches::complement;
 
 use crate::deformed_grid::DeformedGrid;
 use crate::layout::CanvasLayout;
@@ -86,7 +87,7 @@ impl Coverage {
     }
 
     /// The stretches of `columns` in row `y` that are covered, in ascending order.
-    pub(crate) fn covered(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Range<usize>> {
+    pub(crate) fn covered(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Range<usize>> + Clone {
         let stretches = self.rows.get(y).map_or(&[][..], Vec::as_slice);
         let first = stretches.partition_point(|stretch| stretch.end <= columns.start);
         let Range { start, end } = columns;
@@ -96,9 +97,7 @@ impl Coverage {
 
     /// The stretches of `columns` in row `y` that are not covered, in ascending order; some are empty.
     pub(crate) fn uncovered(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Range<usize>> {
-        let starts = std::iter::once(columns.start).chain(self.covered(columns.clone(), y).map(|stretch| stretch.end));
-        let ends = self.covered(columns.clone(), y).map(|stretch| stretch.start).chain([columns.end]);
-        starts.zip(ends).map(|(start, end)| start..end)
+        complement(columns.clone(), self.covered(columns, y))
     }
 
     /// The coverage with those of the other pixels that `as_well` names.

@@ -5,6 +5,7 @@ use trueup_core::Result;
 use trueup_core::color::TransferCurve;
 use trueup_core::mask::Masks;
 use trueup_core::raster::{Photograph, Raster};
+use trueup_core::side::Side;
 use trueup_core::source::PhotographSource;
 use trueup_core::statistics::median;
 
@@ -44,32 +45,21 @@ impl PhotographSource for Unframed<'_> {
     }
 }
 
-/// A border of a photograph.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
-    Left,
-    Top,
-    Right,
-    Bottom,
+/// Pixel number `along` of the line that is `depth` lines away from a side of a photograph, as its column and row.
+fn place(side: Side, depth: usize, along: usize, [width, height]: [usize; 2]) -> [usize; 2] {
+    match side {
+        Side::Left => [depth, along],
+        Side::Top => [along, depth],
+        Side::Right => [width - 1 - depth, along],
+        Side::Bottom => [along, height - 1 - depth],
+    }
 }
 
-impl Side {
-    /// Pixel number `along` of the line that is `depth` lines away from the border, as its column and row.
-    fn place(self, depth: usize, along: usize, [width, height]: [usize; 2]) -> [usize; 2] {
-        match self {
-            Self::Left => [depth, along],
-            Self::Top => [along, depth],
-            Self::Right => [width - 1 - depth, along],
-            Self::Bottom => [along, height - 1 - depth],
-        }
-    }
-
-    /// Pixels along it, and lines from it to the other side.
-    fn lengths(self, [width, height]: [usize; 2]) -> [usize; 2] {
-        match self {
-            Self::Left | Self::Right => [height, width],
-            Self::Top | Self::Bottom => [width, height],
-        }
+/// Pixels along a side, and lines from it to the other side.
+fn lengths(side: Side, [width, height]: [usize; 2]) -> [usize; 2] {
+    match side {
+        Side::Left | Side::Right => [height, width],
+        Side::Top | Side::Bottom => [width, height],
     }
 }
 
@@ -79,10 +69,10 @@ fn unframed<T: Copy + Default + Into<f32>>(mut raster: Raster<T>, white: f32) ->
     // A border's frame ends where the others' begin: these go first.
     for side in [Side::Left, Side::Right, Side::Top, Side::Bottom] {
         let lines = frame_lines(&raster, side, white);
-        let [along, _] = side.lengths(size);
+        let [along, _] = lengths(side, size);
         for (depth, at) in (0..lines).flat_map(|depth| (0..along).map(move |at| (depth, at))) {
-            let [from_x, from_y] = side.place(lines, at, size);
-            let [x, y] = side.place(depth, at, size);
+            let [from_x, from_y] = place(side, lines, at, size);
+            let [x, y] = place(side, depth, at, size);
             for channel in 0..raster.channels() {
                 let sample = raster.pixel(from_x, from_y)[channel];
                 raster.pixel_mut(x, y)[channel] = sample;
@@ -96,7 +86,7 @@ fn unframed<T: Copy + Default + Into<f32>>(mut raster: Raster<T>, white: f32) ->
 /// no frame.
 fn frame_lines<T: Copy + Default + Into<f32>>(raster: &Raster<T>, side: Side, white: f32) -> usize {
     let size = [raster.width(), raster.height()];
-    let [along, across] = side.lengths(size);
+    let [along, across] = lengths(side, size);
     let widest = ((WIDEST * size[0].min(size[1]) as f64) as usize).max(FEWEST_ROWS);
     let margin = widest + 2;
     if along <= 2 * margin || across <= 2 * margin {
@@ -107,7 +97,8 @@ fn frame_lines<T: Copy + Default + Into<f32>>(raster: &Raster<T>, side: Side, wh
     let colors = raster.channels().min(3);
     let most = (MOST_PLACES * places().len() as f64).ceil() as usize;
     // How far a place of a line is from the frame's color, as a share of white.
-    let off = |depth: usize, at: usize, frame: f32| distance(raster, side.place(depth, at, size), colors, frame, white);
+    let off =
+        |depth: usize, at: usize, frame: f32| distance(raster, place(side, depth, at, size), colors, frame, white);
     let is_frame = |depth: usize, frame: f32| places().filter(|&at| off(depth, at, frame) <= PLAIN).count() >= most;
     let differs = |depth: usize, frame: f32| places().filter(|&at| off(depth, at, frame) >= STEP).count() >= most;
     // A frame may have lines of both kinds.
@@ -134,9 +125,9 @@ fn is_veiled<T: Copy + Default + Into<f32>>(
     /// Share of the places at which the veil must be the same.
     const MOST_ALIKE: f64 = 0.8;
     let size = [raster.width(), raster.height()];
-    let [along, _] = side.lengths(size);
+    let [along, _] = lengths(side, size);
     let level = |depth: usize, at: usize| {
-        let [x, y] = side.place(depth, at, size);
+        let [x, y] = place(side, depth, at, size);
         let samples = &raster.pixel(x, y)[..raster.channels().min(3)];
         samples.iter().map(|&sample| sample.into()).sum::<f32>() / (samples.len() as f32 * white)
     };

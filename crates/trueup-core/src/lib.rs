@@ -34,9 +34,11 @@ pub mod options;
 pub mod outline;
 pub mod raster;
 pub mod scratch;
+pub mod side;
 pub mod source;
 pub mod spherical;
 pub mod statistics;
+pub mod stretches;
 pub mod told_lens;
 pub mod truth;
 

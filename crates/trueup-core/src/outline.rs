@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::mask::Mask;
 use crate::raster::{Photograph, Raster};
+use crate::stretches::complement;
 
 /// A polygon, in pixels of a picture as it is shown, inside of which the photograph lies. What is beside it is no part of the photograph.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,12 +60,7 @@ impl Outline {
 
     /// What of a picture of `size` pixels lies beside the photograph.
     pub fn beside(&self, [width, height]: [usize; 2]) -> Mask {
-        Mask::from_rows(width, height, |y| {
-            let inside = self.stretches(y, width);
-            let starts = std::iter::once(0).chain(inside.iter().map(|stretch| stretch.end));
-            let ends = inside.iter().map(|stretch| stretch.start).chain([width]);
-            starts.zip(ends).map(|(start, end)| start..end).collect::<Vec<_>>()
-        })
+        Mask::from_rows(width, height, |y| complement(0..width, self.stretches(y, width).into_iter()))
     }
 
     /// The photograph in `picture`, with an alpha channel: what lies beside it is transparent.

@@ -17,8 +17,8 @@ use faer::{Conj, c32, c64};
 
 use super::normal_equations::PlacedBlock;
 
-/// Real numbers of a factor beyond which it is in single precision where its solution is wanted to rounding: 134 MB of double ones. Meshes of some eighty photographs of the working
-/// size have so many.
+/// Real numbers of a factor beyond which it is in single precision where its solution is wanted to rounding: 134 MB of double ones. Meshes of some
+/// eighty photographs of the working size have so many.
 pub(super) const MOST_DOUBLES: usize = 1 << 24;
 
 /// A lower triangle L with L L^H = A, as nearly as its numbers are precise.

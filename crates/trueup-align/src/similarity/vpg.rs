@@ -153,9 +153,13 @@ impl<'a> SceneDirections<'a> {
     /// the cameras know so little that it may be theirs, as of two photographs of which one lies on its side.
     fn searched_about(&self, dominant: &Dominant) -> Vector3<f64> {
         let own = self.vertical(&dominant.frame);
-        let out_of_reach = own.angle(&self.level.down) > SEARCH_DEG.to_radians();
         let is_theirs = self.level.angle_to(&own).is_some_and(|found| !found.is_too_wide(false));
-        if out_of_reach && is_theirs { own } else { self.level.down }
+        if self.is_out_of_reach(&own) && is_theirs { own } else { self.level.down }
+    }
+
+    /// Whether a search of all lines together about the cameras' vertical cannot find this one.
+    fn is_out_of_reach(&self, vertical: &Vector3<f64>) -> bool {
+        vertical.angle(&self.level.down) > SEARCH_DEG.to_radians()
     }
 
     /// Photographs whose directions agree with `dominant`.
@@ -244,8 +248,7 @@ impl<'a> SceneDirections<'a> {
     /// its vertical is out of reach. Before a tower that fills photographs taken upward, what stands out within reach is a frame of the lines that
     /// lie between its edges.
     fn is_outdone(&self, frame: &Matrix3<f64>, own: &Dominant) -> bool {
-        let out_of_reach = self.vertical(&own.frame).angle(&self.level.down) > SEARCH_DEG.to_radians();
-        if !out_of_reach || self.inliers(own).len() < MIN_AGREEING {
+        if !self.is_out_of_reach(&self.vertical(&own.frame)) || self.inliers(own).len() < MIN_AGREEING {
             return false;
         }
         let refined = self.vote.refine_frame(&own.frame, AxisWeights::new(0, 1.0, 1.0));

@@ -147,8 +147,8 @@ fn subtract_row<L: Lanes>(octave: &Octave, y: usize, padded: usize, recent: &mut
 /// The greatest and least over three rows and three neighboring levels, column by column.
 #[inline(always)]
 fn column_extremes<L: Lanes>(recent: &[f32], differences: usize, padded: usize, extremes: &mut [f32]) {
+    let row_stride = differences * padded;
     for x in (0..padded).step_by(L::COUNT) {
-        let row_stride = differences * padded;
         let mut below = row_extremes::<L>(recent, x, row_stride);
         let mut here = row_extremes::<L>(recent, padded + x, row_stride);
         for level in 1..differences - 1 {

@@ -1,9 +1,10 @@
 //! Padding that several pictures have in common.
 
 use trueup_core::outline::Outline;
+use trueup_core::side::Side;
 
 use super::edge::{Edge, simplify};
-use super::{FEW_RAYS, LEAST_DEPTH, MARGIN_PX, MOST, Padding, RAYS, Ray, SAME_PX, Side, believable};
+use super::{FEW_RAYS, LEAST_DEPTH, MARGIN_PX, MOST, Padding, RAYS, Ray, SAME_PX, believable};
 
 /// Rays between a place and those beside it that it is in line with along a smooth curve.
 const SMOOTH_RAYS: usize = 4;

@@ -1,6 +1,8 @@
 //! Straight lines along which padding ends.
 
-use super::{Ray, STRAIGHT_PX, Side};
+use trueup_core::side::Side;
+
+use super::{Ray, STRAIGHT_PX};
 
 /// Most that places of an outline may lie beside it when it is told by fewer, in working pixels.
 const SIMPLER_PX: f64 = 1.0;

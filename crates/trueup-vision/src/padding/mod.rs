@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 use trueup_core::outline::Outline;
 use trueup_core::raster::Raster;
+use trueup_core::side::Side;
 use trueup_core::statistics::median_of;
 
 use crate::border::{EVEN, STEP};
@@ -130,29 +131,8 @@ struct Ray {
     direction: [f64; 2],
     /// Pixels to the middle.
     length: f64,
+    /// Where it starts.
     side: Side,
-}
-
-/// Where a ray starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
-    Top,
-    Right,
-    Bottom,
-    Left,
-}
-
-impl Side {
-    const ALL: [Self; 4] = [Self::Top, Self::Right, Self::Bottom, Self::Left];
-
-    fn opposite(self) -> Self {
-        match self {
-            Self::Top => Self::Bottom,
-            Self::Right => Self::Left,
-            Self::Bottom => Self::Top,
-            Self::Left => Self::Right,
-        }
-    }
 }
 
 impl Ray {

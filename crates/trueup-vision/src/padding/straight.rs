@@ -1,9 +1,10 @@
 //! Padding that ends along four straight sides.
 
 use trueup_core::outline::Outline;
+use trueup_core::side::Side;
 
 use super::edge::Edge;
-use super::{EvenRay, FEW_RAYS, MARGIN_PX, MOST, Padding, Ray, SAME_PX, STRAIGHT_PX, Side, believable};
+use super::{EvenRay, FEW_RAYS, MARGIN_PX, MOST, Padding, Ray, SAME_PX, STRAIGHT_PX, believable};
 
 /// A photograph with four straight sides in a picture.
 #[derive(Debug, Clone, PartialEq)]

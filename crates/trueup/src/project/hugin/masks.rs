@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use trueup_core::side::Side;
+
 use super::super::record::ImageRecord;
 
 /// Pixels within which an outline's corner lies at the picture's border.
@@ -40,41 +42,28 @@ fn stored_place([x, y]: [f64; 2], [width, height]: [f64; 2], orientation: u8) ->
     }
 }
 
-/// Sides of a picture, clockwise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
-    Left,
-    Top,
-    Right,
-    Bottom,
+/// How many pixels beyond a side of a picture a place lies; negative inside.
+fn beyond(side: Side, [x, y]: [f64; 2], [width, height]: [f64; 2]) -> f64 {
+    match side {
+        Side::Left => -x,
+        Side::Top => -y,
+        Side::Right => x - width,
+        Side::Bottom => y - height,
+    }
 }
 
-impl Side {
-    const ALL: [Self; 4] = [Self::Left, Self::Top, Self::Right, Self::Bottom];
+/// Whether a place lies at the border at a side, or beyond.
+fn is_reached(side: Side, place: [f64; 2], size: [f64; 2]) -> bool {
+    beyond(side, place, size) >= -AT_BORDER_PX
+}
 
-    /// How many pixels beyond this side of a picture a place lies; negative inside.
-    fn beyond(self, [x, y]: [f64; 2], [width, height]: [f64; 2]) -> f64 {
-        match self {
-            Self::Left => -x,
-            Self::Top => -y,
-            Self::Right => x - width,
-            Self::Bottom => y - height,
-        }
-    }
-
-    /// Whether a place lies at the border there, or beyond.
-    fn is_reached(self, place: [f64; 2], size: [f64; 2]) -> bool {
-        self.beyond(place, size) >= -AT_BORDER_PX
-    }
-
-    /// A place moved straight to the border there; one that lies beyond stays.
-    fn onto(self, [x, y]: [f64; 2], [width, height]: [f64; 2]) -> [f64; 2] {
-        match self {
-            Self::Left => [x.min(0.0), y],
-            Self::Top => [x, y.min(0.0)],
-            Self::Right => [x.max(width), y],
-            Self::Bottom => [x, y.max(height)],
-        }
+/// A place moved straight to the border at a side; one that lies beyond stays.
+fn onto(side: Side, [x, y]: [f64; 2], [width, height]: [f64; 2]) -> [f64; 2] {
+    match side {
+        Side::Left => [x.min(0.0), y],
+        Side::Top => [x, y.min(0.0)],
+        Side::Right => [x.max(width), y],
+        Side::Bottom => [x, y.max(height)],
     }
 }
 
@@ -90,25 +79,25 @@ fn beside(mut corners: Vec<[f64; 2]>, size: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
         corners.reverse();
     }
     let outermost = |side: Side| {
-        let beyond = |corner: usize| side.beyond(corners[corner], size);
-        (0..count).max_by(|&one, &other| beyond(one).total_cmp(&beyond(other))).unwrap_or(0)
+        let distance = |corner: usize| beyond(side, corners[corner], size);
+        (0..count).max_by(|&one, &other| distance(one).total_cmp(&distance(other))).unwrap_or(0)
     };
     let between = |(side, next): (Side, Side)| {
         let (first, last) = (outermost(side), outermost(next));
         let steps = (last + count - first) % count;
         let chain: Vec<[f64; 2]> = (first..=first + steps).map(|corner| corners[corner % count]).collect();
         // Where the polygon follows the border, nothing lies between the two.
-        let along = chain.iter().skip(1).take_while(|&&place| side.is_reached(place, size)).count();
-        let along_next = chain.iter().rev().skip(1).take_while(|&&place| next.is_reached(place, size)).count();
+        let along = chain.iter().skip(1).take_while(|&&place| is_reached(side, place, size)).count();
+        let along_next = chain.iter().rev().skip(1).take_while(|&&place| is_reached(next, place, size)).count();
         let mut mask = chain[along..(chain.len() - along_next).max(along + 1)].to_vec();
         let [start, end] = [mask[0], mask[mask.len() - 1]];
-        let [from, onto] = [side.onto(start, size), next.onto(end, size)];
+        let [from, to] = [onto(side, start, size), onto(next, end, size)];
         // The picture's corner, or one outside of a polygon that reaches beyond it.
         let corner = match side {
-            Side::Left | Side::Right => [from[0], onto[1]],
-            Side::Top | Side::Bottom => [onto[0], from[1]],
+            Side::Left | Side::Right => [from[0], to[1]],
+            Side::Top | Side::Bottom => [to[0], from[1]],
         };
-        mask.extend([onto, corner, from]);
+        mask.extend([to, corner, from]);
         mask.dedup();
         mask.pop_if(|last| *last == start);
         mask
