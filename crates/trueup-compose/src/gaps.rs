@@ -162,6 +162,11 @@ impl Gaps {
         self.coverage.with(|x, y| self.is_gap(x, y))
     }
 
+    /// The column after column `x`; after the last one of a full turn, the first.
+    pub(crate) fn next_column(&self, x: usize) -> usize {
+        if self.around && x + 1 == self.size[0] { 0 } else { x + 1 }
+    }
+
     /// Whether the canvas goes all the way round.
     pub(crate) fn is_around(&self) -> bool {
         self.around

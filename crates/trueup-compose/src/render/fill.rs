@@ -5,6 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 use trueup_core::{Result, StageContext};
 
+use super::grain;
 use super::panorama::{Panorama, PanoramaPixels, linear_of_sum};
 use super::poles::Poles;
 use crate::coverage::Rectangle;
@@ -44,8 +45,8 @@ impl Shade for SumPixel {
 }
 
 impl Panorama {
-    /// Fills the gaps with a smooth surface, and returns how many pixels that were; `gaps` are those of the layout it was
-    /// made of. The same pixels come out however the panorama is held.
+    /// Fills the gaps with a smooth surface that has the grain of what lies beside it, and returns how many pixels that were;
+    /// `gaps` are those of the layout it was made of. The same pixels come out however the panorama is held.
     ///
     /// # Errors
     /// [`trueup_core::Error::Io`] if a scratch file cannot be read or written; [`trueup_core::Error::Cancelled`].
@@ -83,12 +84,17 @@ fn fill<P: Shade>(store: &mut PixelStore<P>, size: [usize; 2], gaps: &Gaps, cont
     if wanted.is_empty() {
         return Ok(0);
     }
-    let all = canvas.reduced(store, &sources, &BorderColors::default(), context)?;
+    let [all] = canvas.reduced(store, &sources, &BorderColors::default(), |known| [known], context)?;
     let around = BorderColors::of(&all, canvas.first_level);
-    let surface = surface(canvas.reduced(store, &sources, &around, context)?);
+    let with_grain = |known: PyramidPlane<[f32; 4]>| {
+        let grain = grain::of(&known);
+        [known, grain]
+    };
+    let [colors, grain] = canvas.reduced(store, &sources, &around, with_grain, context)?;
+    let (surface, grain) = (surface(colors), surface(grain));
     let once = [canvas.lead, canvas.lead + canvas.width].map(|column| column >> canvas.first_level);
     let poles = Poles::of(size, gaps, &surface, once[0]..once[1]);
-    let filling = Filling { around, surface, poles };
+    let filling = Filling { around, surface, grain, poles };
     let mut filled = 0;
     for tiles in wanted.chunks(TILES_AT_ONCE) {
         context.check_cancelled()?;
@@ -263,37 +269,38 @@ impl<'a> Canvas<'a> {
         Some(beside)
     }
 
-    /// What is known at the first level, of so much of the panorama as gaps need.
-    fn reduced<P: Shade>(
+    /// What is `made` of what is known, at the first level, of so much of the panorama as gaps need.
+    fn reduced<P: Shade, const N: usize>(
         &self,
         store: &PixelStore<P>,
         sources: &[FillTile],
         around: &BorderColors,
+        made: impl Fn(PyramidPlane<[f32; 4]>) -> [PyramidPlane<[f32; 4]>; N] + Sync,
         context: &StageContext,
-    ) -> Result<PyramidPlane<[f32; 4]>> {
+    ) -> Result<[PyramidPlane<[f32; 4]>; N]> {
         let samples = |length: usize| 0..length.div_ceil(1 << self.first_level);
-        let mut known = PyramidPlane::new(samples(self.width + 2 * self.lead), samples(self.height));
+        let size = [samples(self.width + 2 * self.lead), samples(self.height)];
+        let mut all: [_; N] = std::array::from_fn(|_| PyramidPlane::new(size[0].clone(), size[1].clone()));
+        let first = |plane| (0..self.first_level).fold(plane, |plane: PyramidPlane<[f32; 4]>, _| plane.reduced());
         for tiles in sources.chunks(TILES_AT_ONCE) {
             context.check_cancelled()?;
-            let reduced: Vec<Option<PyramidPlane<[f32; 4]>>> = tiles
+            let reduced: Vec<Option<[PyramidPlane<[f32; 4]>; N]>> = tiles
                 .par_iter()
-                .map(|tile| {
-                    let known = self.known(store, tile, around)?;
-                    Ok(known.map(|plane| (0..self.first_level).fold(plane, |plane, _| plane.reduced())))
-                })
+                .map(|tile| Ok(self.known(store, tile, around)?.map(|known| made(known).map(first))))
                 .collect::<Result<_>>()?;
-            for (tile, plane) in tiles.iter().zip(reduced) {
-                let Some(plane) = plane else { continue };
+            for (tile, planes) in tiles.iter().zip(reduced) {
                 let own =
                     |range: &Range<usize>| range.start >> self.first_level..range.end.div_ceil(1 << self.first_level);
                 let columns = own(&tile.columns);
-                for y in own(&tile.rows) {
-                    let texels = &plane.row(y)[columns.start - plane.columns.start..][..columns.len()];
-                    known.row_mut(y)[columns.clone()].copy_from_slice(texels);
+                for (all, plane) in all.iter_mut().zip(planes.into_iter().flatten()) {
+                    for y in own(&tile.rows) {
+                        let texels = &plane.row(y)[columns.start - plane.columns.start..][..columns.len()];
+                        all.row_mut(y)[columns.clone()].copy_from_slice(texels);
+                    }
                 }
             }
         }
-        Ok(known)
+        Ok(all)
     }
 
     /// A tile's pixels with its gaps filled, and how many that were; `None` if none is to be filled.
@@ -340,12 +347,23 @@ impl<'a> Canvas<'a> {
                     && let Some(smooth) = color(texel)
                 {
                     let smooth = filling.poles.faded(y, smooth);
-                    *pixel = P::of_root([0, 1, 2].map(|k| share * own[k] + (1.0 - share) * smooth[k]));
+                    let grain = self.grain([x, y], &filling.grain);
+                    let grainy = |k: usize| (smooth[k] + grain[k]).max(0.0);
+                    *pixel = P::of_root([0, 1, 2].map(|k| share * own[k] + (1.0 - share) * grainy(k)));
                     filled += 1;
                 }
             }
         }
         Ok(Some((filled, pixels)))
+    }
+
+    /// What the grain changes of the color of a pixel, by the `deviations` of what lies beside gaps.
+    fn grain(&self, [x, y]: [usize; 2], deviations: &PyramidPlane<[f32; 4]>) -> [f32; 3] {
+        let step = f64::from(1 << self.first_level);
+        // Sample i lies on the middle of pixel i * step.
+        let at = [(x + self.lead) as f64 / step, y as f64 / step];
+        let noise = grain::noise([x, self.gaps.next_column(x)], y);
+        grain::deviation(deviations.color_at(at).unwrap_or_default()).map(|deviation| deviation * noise)
     }
 }
 
@@ -354,6 +372,8 @@ struct Filling {
     around: BorderColors,
     /// Over the whole of the canvas, at the first level.
     surface: PyramidPlane<[f32; 4]>,
+    /// Deviations of the grain, in the same way.
+    grain: PyramidPlane<[f32; 4]>,
     poles: Poles,
 }
 

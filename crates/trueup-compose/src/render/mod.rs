@@ -9,6 +9,7 @@ mod average;
 mod checked;
 mod divided;
 mod fill;
+mod grain;
 mod helpers;
 mod input;
 mod layer;

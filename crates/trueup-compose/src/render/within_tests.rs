@@ -113,15 +113,46 @@ fn gaps_take_up_the_colors_beside_them() {
         panorama.rgba8_row(y, &mut row).expect("in memory");
         for (x, expected) in [(30, 40), (270, 200)] {
             let pixel = &row[4 * x..][..4];
-            assert!(pixel[..3].iter().all(|level| level.abs_diff(expected) <= 1) && pixel[3] == 255, "{pixel:?}");
+            // But for the grain.
+            assert!(pixel[..3].iter().all(|level| level.abs_diff(expected) <= 2) && pixel[3] == 255, "{pixel:?}");
         }
         let levels: Vec<u8> = row.chunks_exact(4).map(|pixel| pixel[0]).collect();
         // The other half is felt a little where nothing nearer is known.
-        assert!(levels.windows(2).all(|pair| pair[0] <= pair[1] + 1), "row {y}: {levels:?}");
+        assert!(levels.windows(2).all(|pair| pair[0] <= pair[1] + 3), "row {y}: {levels:?}");
     }
     // The rest, the 100 empty rows below as well, is what it was.
     let first = 4 * 300 * 20;
     assert!(rows(&panorama)[first..] == before[first..]);
+}
+
+/// A slope of so much grain that is carried on into the strip above it, and one of none: what is filled has that of the photograph, and enough at
+/// least that a slope of a level in twenty columns is no row of bands.
+#[test]
+fn what_is_filled_has_the_grain_of_what_lies_beside_it() {
+    let grains = |strength: f32| {
+        let slope = move |x: usize, y: usize| {
+            let noise = grain::noise([x, x + 1], 500 + y);
+            (100.0 + x as f32 / 20.0 + strength * noise).round() as u8
+        };
+        let (mut panorama, gaps) = below_a_strip(20, slope);
+        panorama.fill(&gaps, &StageContext::default()).expect("in memory");
+        let pixels = rows(&panorama);
+        let level = |x: usize, y: usize| f32::from(pixels[4 * (300 * y + x)]);
+        let deviation = |rows: std::ops::Range<usize>| {
+            let all = rows.flat_map(|y| (20..280).map(move |x| level(x, y) - 100.0 - x as f32 / 20.0));
+            let (sum, squares, count) = all
+                .fold((0.0, 0.0, 0.0), |(sum, squares, count), one| (sum + one, squares + one * one, count + 1.0_f32));
+            (squares / count - (sum / count).powi(2)).sqrt()
+        };
+        [deviation(0..16), deviation(30..60)]
+    };
+    for strength in [1.0, 2.0] {
+        let [filled, photographed] = grains(strength);
+        assert!((filled / photographed - 1.0).abs() < 0.25, "{filled} beside {photographed}");
+    }
+    // Rounding alone is off by 0.29 of a level in the mean.
+    let [filled, _] = grains(0.0);
+    assert!((0.35..0.55).contains(&filled), "{filled}");
 }
 
 /// A sphere of 320 x 160 pixels, dark on one side and bright on the other, without its lowest 20 rows: beside the hole, both go on, and
