@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Vector2};
 use trueup_core::geometry::Homography;
 use trueup_core::matches::{PairMatches, PointMatch};
 use trueup_core::source::WorkingFrame;
+use trueup_core::statistics::median_of;
 
 use super::overlap::PredictedOverlap;
 
@@ -35,7 +36,7 @@ pub enum StrangerKind {
         of: usize,
     },
     /// It shows all that each of `of` shows, and more, on a format that no camera has, as these do, or all of one size; or, on any format, nothing but what they show together, with no more
-    /// detail.
+    /// detail. Where it shows them, it matches them about as densely as any other.
     Panorama {
         /// At least two photographs' numbers, ascending.
         of: Vec<usize>,
@@ -77,6 +78,11 @@ const PART: f64 = 0.5;
 const NOTHING_ELSE: f64 = 0.95;
 /// ... and none is enlarged in it by more than this, as lengths go: leaving it out loses no detail.
 const MOST_ENLARGED: f64 = 1.25;
+/// Least number of matches for the area it shows that a panorama has with its photographs, in the middle, as a share of that with the photograph that it
+/// has most matches with. Where a scene repeats a thing near and far, a photograph that shows it near takes those that show it far for parts of it, by
+/// the matches of that thing alone. Of panoramas put beside their photographs (seven sets) it is 0.48 to 1, of such photographs (a rendered room with the
+/// same picture on two walls) 0.1.
+const AS_DENSE: f64 = 0.25;
 /// Median distance of matches from the same place in both, working pixels, up to which two pictures are of one exposure: hands, and wind on a tripod, move a
 /// camera by more between two.
 const SAME_PLACE_PX: f64 = 0.2;
@@ -134,6 +140,8 @@ struct SharedView {
     of_b: Vec<bool>,
     /// Share of the matches in the overlap that agree.
     agreeing: f64,
+    /// Number of matches.
+    matches: usize,
     /// By how much a enlarges what b shows, as lengths in working pixels go, in the middle of b.
     enlarged_in_a: f64,
     /// Whether everything lies at the same place in both, and nothing says that they were taken at two moments.
@@ -159,6 +167,7 @@ impl SharedView {
             of_a: cells(frame_a).map(|at| overlap.point_in_b(at).is_some()).collect(),
             of_b: cells(frame_b).map(|at| overlap.point_in_a(at).is_some()).collect(),
             agreeing: pair.agreeing as f64 / pair.in_overlap.max(1) as f64,
+            matches: pair.inliers.len(),
         })
     }
 
@@ -306,10 +315,23 @@ fn shown_of(
         shown.len() >= MIN_SHOWN + views.iter().filter(same).count()
     };
     let covered = share(&covered);
-    if several(&whole) && covered >= MIN_COVERED {
+    let is_one = |shown: &BTreeSet<usize>| several(shown) && is_matched_as_densely(picture, shown, views);
+    if is_one(&whole) && covered >= MIN_COVERED {
         return Some(whole.into_iter().collect());
     }
-    (several(&mostly) && covered >= CROPPED_COVERED).then(|| mostly.into_iter().collect())
+    (is_one(&mostly) && covered >= CROPPED_COVERED).then(|| mostly.into_iter().collect())
+}
+
+/// Whether `picture` has enough matches with the photographs that it shows, for what it shows of them, to be made of them: see [`AS_DENSE`].
+fn is_matched_as_densely(picture: usize, shown: &BTreeSet<usize>, views: &[SharedView]) -> bool {
+    let of_picture = |view: &SharedView| {
+        let (other, of_picture, _) = view.seen_from(picture)?;
+        Some((other, view.matches, view.matches as f64 / share(of_picture).max(f64::MIN_POSITIVE)))
+    };
+    let all: Vec<_> = views.iter().filter_map(of_picture).collect();
+    let most = all.iter().max_by_key(|(_, matches, _)| *matches).map_or(0.0, |(.., density)| *density);
+    let middle = median_of(all.iter().filter(|(other, ..)| shown.contains(other)).map(|(.., density)| *density));
+    middle.is_some_and(|middle| middle >= AS_DENSE * most)
 }
 
 /// The photographs that together show all that `picture` does, with as much detail, and overlap each other without it: it is a panorama of them, or adds no
@@ -343,7 +365,8 @@ fn superfluous_beside(
     {
         reached.extend([view.a, view.b]);
     }
-    (is_all && reached == inside).then(|| inside.into_iter().collect())
+    (is_all && reached == inside && is_matched_as_densely(picture, &inside, views))
+        .then(|| inside.into_iter().collect())
 }
 
 #[cfg(test)]

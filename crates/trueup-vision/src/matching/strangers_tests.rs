@@ -119,6 +119,29 @@ fn a_panorama_of_a_cameras_format_shows_nothing_but_its_photographs() {
     assert_eq!(block_and(1.0, 45.0), []);
 }
 
+/// It shows a thing near that four photographs of the other side of the room show far, and matches these by that alone; and a part of what a
+/// fifth one shows, which it matches everywhere.
+#[test]
+fn a_photograph_of_what_others_show_far_is_one() {
+    let mut frames = frames(&[[600.0, 400.0]; 4]);
+    frames.extend([WorkingFrame { width: 450.0, height: 300.0, working_from_full: 0.5 }; 2]);
+    let corners = [[0.0, 0.0], [150.0, 0.0], [0.0, 100.0], [150.0, 100.0]];
+    let matched = |pair: PairMatches, count: usize| {
+        let at = |k: usize| [10.0 + (k % 20) as f64, 20.0 + (k / 20) as f64];
+        PairMatches { inliers: (0..count).map(|k| PointMatch { in_a: at(k), in_b: at(k) }).collect(), ..pair }
+    };
+    let strangers = |count: usize| {
+        let mut pairs = vec![matched(pair(4, 5, 1.0, -150.0, 0.0), 600)];
+        for (b, at_b) in corners.iter().enumerate() {
+            pairs.extend((0..b).map(|a| pair(a, b, 1.0, corners[a][0] - at_b[0], corners[a][1] - at_b[1])));
+            pairs.push(matched(pair(b, 4, 1.0, at_b[0], at_b[1]), count));
+        }
+        found(&frames, &pairs)
+    };
+    assert_eq!(strangers(50), []);
+    assert_eq!(strangers(300), [Stranger { photograph: 4, kind: StrangerKind::Panorama { of: vec![0, 1, 2, 3] } }]);
+}
+
 /// Without it, the left and the right half would not overlap.
 #[test]
 fn what_holds_the_others_together_is_a_photograph() {
