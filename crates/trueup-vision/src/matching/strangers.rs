@@ -80,8 +80,8 @@ const NOTHING_ELSE: f64 = 0.95;
 const MOST_ENLARGED: f64 = 1.25;
 /// Least number of matches for the area it shows that a panorama has with its photographs, in the middle, as a share of that with the photograph that it
 /// has most matches with. Where a scene repeats a thing near and far, a photograph that shows it near takes those that show it far for parts of it, by
-/// the matches of that thing alone. Of panoramas put beside their photographs (seven sets) it is 0.48 to 1, of such photographs (a rendered room with the
-/// same picture on two walls) 0.1.
+/// the matches of that thing alone. Of panoramas put beside their photographs (six sets) it is 0.48 to 1, of two such photographs (of a rendered room with
+/// the same picture on two walls) 0.1; set looking at these.
 const AS_DENSE: f64 = 0.25;
 /// Median distance of matches from the same place in both, working pixels, up to which two pictures are of one exposure: hands, and wind on a tripod, move a
 /// camera by more between two.
