@@ -116,6 +116,19 @@ impl Gaps {
         self.coverage.covered(columns, y)
     }
 
+    /// The stretches of `columns` in row `y` that no photograph covers, or none wholly, in ascending order; some are empty.
+    pub(crate) fn uncovered(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Range<usize>> {
+        self.coverage.uncovered(columns, y)
+    }
+
+    /// What of the canvas is composed in any case where these gaps are filled.
+    pub(crate) fn composed(&self) -> Rectangle {
+        match &self.extent {
+            Extent::Small(_) => Rectangle::whole(self.size),
+            Extent::Within(rectangle) => rectangle.clone(),
+        }
+    }
+
     /// Whether a pixel, if no photograph covers it, is part of a gap.
     pub(crate) fn is_gap(&self, x: usize, y: usize) -> bool {
         match &self.extent {

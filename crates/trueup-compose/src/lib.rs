@@ -36,6 +36,7 @@ mod label;
 mod light;
 mod linear_table;
 mod look;
+mod max_flow;
 mod memory_plan;
 mod pyramid;
 mod render_options;

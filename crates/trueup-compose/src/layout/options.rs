@@ -32,9 +32,9 @@ trueup_core::options! {
         /// Share of the covered pixels that `crop = auto` must be able to keep; otherwise it keeps all, ragged borders as well. Lower
         /// it if ragged borders are kept that you would rather lose.
         min_kept: f64 = 0.6, between(0.0, 1.0), "";
-        /// Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled with
-        /// a smooth surface over their borders' colors. 0 fills nothing; raise it to 0.1 where ragged borders lie in an even sky
-        /// or wall, in which small fillings are not noticed.
+        /// Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled as
+        /// what lies beside them goes on. 0 fills nothing; raise it to 0.1 where ragged borders lie in a sky, a lawn or a wall, in
+        /// which small fillings are not noticed.
         fill: f64 = 0.0, between(0.0, 1.0), "", basic;
     }
 }

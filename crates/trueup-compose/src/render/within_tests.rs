@@ -155,6 +155,29 @@ fn what_is_filled_has_the_grain_of_what_lies_beside_it() {
     assert!((0.35..0.55).contains(&filled), "{filled}");
 }
 
+/// A photograph that is a chessboard of squares of 10 pixels, gray with some grain: in the strip above, where the smooth surface would soon be of one gray,
+/// there are squares, whose sides go on those of the photograph.
+#[test]
+fn what_repeats_itself_goes_on_in_a_gap() {
+    const STRIP: usize = 20;
+    let is_dark = |x: usize, y: usize| (x / 10 + y / 10).is_multiple_of(2);
+    let board = |x: usize, y: usize| {
+        let level = if is_dark(x, y) { 90.0 } else { 150.0 };
+        (level + grain::noise([x, x + 1], 900 + y)).round() as u8
+    };
+    let (mut panorama, gaps) = below_a_strip(STRIP, board);
+    assert_eq!(panorama.fill(&gaps, &StageContext::default()).expect("in memory"), 300 * STRIP);
+    let pixels = rows(&panorama);
+    for y in 0..STRIP {
+        let level = |x: usize| pixels[4 * (300 * y + x)];
+        let dark_as_below = (0..300).filter(|&x| (level(x) < 120) == is_dark(x, 0)).count();
+        // Where two offsets meet, a side may be a pixel off.
+        assert!(!(30..270).contains(&dark_as_below), "row {y}: {dark_as_below} of 300");
+        let of_the_board = (0..300).filter(|&x| [90, 150].iter().any(|&gray| level(x).abs_diff(gray) < 15)).count();
+        assert!(of_the_board > 240, "row {y}: {of_the_board} of 300");
+    }
+}
+
 /// A sphere of 320 x 160 pixels, dark on one side and bright on the other, without its lowest 20 rows: beside the hole, both go on, and
 /// at the pole, which is one place, there is one color.
 #[test]

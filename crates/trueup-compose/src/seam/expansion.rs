@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use super::band::Band;
 use super::energy::SeamEnergy;
-use super::max_flow::{DOWN, GridFlow, RIGHT};
 use crate::label::{Label, NOBODY};
+use crate::max_flow::{DOWN, GridFlow, RIGHT};
 use crate::window::Window;
 
 /// Working memory of the expansions.

@@ -8,7 +8,6 @@ mod band;
 mod energy;
 mod expansion;
 mod labels;
-mod max_flow;
 mod moving;
 mod neighbors;
 mod options;

@@ -66,8 +66,8 @@ class ComposeKeywords(SaveKeywords, total=False):
     auto)."""
     fill: float
     """Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled
-    with a smooth surface over their borders' colors. 0 fills nothing; raise it to 0.1 where ragged borders lie in an
-    even sky or wall, in which small fillings are not noticed (default 0.0)."""
+    as what lies beside them goes on. 0 fills nothing; raise it to 0.1 where ragged borders lie in a sky, a lawn or a
+    wall, in which small fillings are not noticed (default 0.0)."""
     memory: str
     """Memory that the work may take; auto is a quarter of the machine's, or more where less is too little. With less,
     the canvas goes to a scratch file and photographs are decoded again. Set it where other programs need theirs
@@ -184,8 +184,8 @@ class BatchKeywords(SaveKeywords, total=False):
     auto)."""
     fill: float
     """Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled
-    with a smooth surface over their borders' colors. 0 fills nothing; raise it to 0.1 where ragged borders lie in an
-    even sky or wall, in which small fillings are not noticed (default 0.0)."""
+    as what lies beside them goes on. 0 fills nothing; raise it to 0.1 where ragged borders lie in a sky, a lawn or a
+    wall, in which small fillings are not noticed (default 0.0)."""
     method: Literal[
         "vpg",
         "gsp-2d",

@@ -193,7 +193,7 @@ fn framed(
 fn report_filled(filled: usize, layout: &CanvasLayout, context: &StageContext) {
     if filled > 0 {
         let percent = 100.0 * filled as f64 / (layout.width as f64 * layout.height as f64);
-        let message = format!("{percent:.2} % of it is shown by no photograph and was filled with a smooth surface");
+        let message = format!("{percent:.2} % of it is shown by no photograph and was filled with what lies beside it");
         let hint = "Leave --fill out to leave it empty.";
         context.report(Diagnostic::note("gaps-filled", Subject::stage("panorama"), message, hint));
     }

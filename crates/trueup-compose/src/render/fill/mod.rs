@@ -1,10 +1,15 @@
-//! Filling gaps: a smooth surface over the colors along their borders.
+//! Filling gaps: a smooth surface over the colors along their borders, and beside what is no such surface what the panorama shows elsewhere.
+
+mod border_colors;
+mod completion;
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 use trueup_core::{Result, StageContext};
 
+use self::border_colors::BorderColors;
+use self::completion::{Completion, Elsewhere};
 use super::grain;
 use super::panorama::{Panorama, PanoramaPixels, linear_of_sum};
 use super::poles::Poles;
@@ -94,7 +99,8 @@ fn fill<P: Shade>(store: &mut PixelStore<P>, size: [usize; 2], gaps: &Gaps, cont
     let (surface, grain) = (surface(colors), surface(grain));
     let once = [canvas.lead, canvas.lead + canvas.width].map(|column| column >> canvas.first_level);
     let poles = Poles::of(size, gaps, &surface, once[0]..once[1]);
-    let filling = Filling { around, surface, grain, poles };
+    let completion = Completion::of(&canvas, store, &surface, context)?;
+    let filling = Filling { around, surface, grain, poles, completion };
     let mut filled = 0;
     for tiles in wanted.chunks(TILES_AT_ONCE) {
         context.check_cancelled()?;
@@ -335,6 +341,7 @@ impl<'a> Canvas<'a> {
             let reduced = beside.reduced();
             *level = std::mem::replace(&mut beside, reduced);
         }
+        let elsewhere = Elsewhere::read(self, store, tile, &filling.completion)?;
         let surface = pulled(levels, Some(&filling.surface));
         let mut filled = 0;
         for (y, pixels) in tile.rows.clone().zip(pixels.chunks_exact_mut(columns.len())) {
@@ -348,8 +355,9 @@ impl<'a> Canvas<'a> {
                 {
                     let smooth = filling.poles.faded(y, smooth);
                     let grain = self.grain([x, y], &filling.grain);
-                    let grainy = |k: usize| (smooth[k] + grain[k]).max(0.0);
-                    *pixel = P::of_root([0, 1, 2].map(|k| share * own[k] + (1.0 - share) * grainy(k)));
+                    let grainy = [0, 1, 2].map(|k| smooth[k] + grain[k]);
+                    let color = elsewhere.as_ref().map_or(grainy, |there| there.over([x + self.lead, y], grainy));
+                    *pixel = P::of_root([0, 1, 2].map(|k| share * own[k] + (1.0 - share) * color[k].max(0.0)));
                     filled += 1;
                 }
             }
@@ -375,57 +383,7 @@ struct Filling {
     /// Deviations of the grain, in the same way.
     grain: PyramidPlane<[f32; 4]>,
     poles: Poles,
-}
-
-/// The colors of the borders of gaps, each over what lies around it; none known by default.
-#[derive(Debug, Default)]
-struct BorderColors {
-    means: PyramidPlane<[f32; 4]>,
-    /// Log2 of the pixels per sample.
-    level: u32,
-}
-
-impl BorderColors {
-    /// From what is known of the borders at a level: the kind of color that is more of a wide part of the border, and by it that of ever smaller parts. Where
-    /// a roof meets the sky beside a gap, the mean of both is neither.
-    fn of(known: &PyramidPlane<[f32; 4]>, level: u32) -> Self {
-        /// Levels above it that the kind is sought at: samples of 64 pixels on most canvases at first, of 32 at last, which see three times as far, so that a lamp or a
-        /// twig is the lesser part of what they see. From samples of 128, a sky is carried on over the clouds that lie beside the gap.
-        const COARSER: [u32; 2] = [3, 2];
-        let means = |plane: PyramidPlane<[f32; 4]>, levels: u32| Self {
-            means: (0..levels).fold(plane, |plane, _| plane.reduced()),
-            level: level + levels,
-        };
-        COARSER[1..].iter().fold(means(known.clone(), COARSER[0]), |wider, &coarser| {
-            let mut belonging = known.clone();
-            for y in belonging.rows.clone() {
-                let first = belonging.columns.start;
-                for (x, texel) in (first..).zip(belonging.row_mut(y)) {
-                    if let Some(root) = color(*texel) {
-                        let share = wider.belonging(x << level, y << level, root);
-                        *texel = texel.map(|value| value * share);
-                    }
-                }
-            }
-            means(belonging, coarser)
-        })
-    }
-
-    /// How much a color at a pixel of the canvas belongs to the border around it: Tukey's biweight of its distance. A lamp that ends
-    /// at the border of a sky is no part of it, and is not carried on.
-    fn belonging(&self, x: usize, y: usize, root: [f32; 3]) -> f32 {
-        /// Distance from which on a color is of another kind, square root of linear light: three times what clouds differ by.
-        const OTHER_KIND: f32 = 0.25;
-        /// What it counts all the same, where the border has no kind.
-        const LEAST: f32 = 0.002;
-        let (x, y) = (x >> self.level, y >> self.level);
-        if !(self.means.columns.contains(&x) && self.means.rows.contains(&y)) {
-            return 1.0;
-        }
-        let Some(mean) = color(self.means.row(y)[x - self.means.columns.start]) else { return 1.0 };
-        let apart = (0..3).map(|k| (root[k] - mean[k]).abs()).fold(0.0, f32::max) / OTHER_KIND;
-        if apart < 1.0 { (1.0 - apart * apart).powi(2).max(LEAST) } else { LEAST }
-    }
+    completion: Completion,
 }
 
 /// The surface over the whole of a level, of which some is known.

@@ -14,8 +14,8 @@
 use std::collections::VecDeque;
 
 /// Directions to the four neighbors: right, down, left, up. `direction ^ 2` leads back.
-pub(super) const RIGHT: usize = 0;
-pub(super) const DOWN: usize = 1;
+pub(crate) const RIGHT: usize = 0;
+pub(crate) const DOWN: usize = 1;
 
 const FREE: u8 = 0;
 const SOURCE: u8 = 1;
@@ -36,7 +36,7 @@ const WORTH_HALVING: usize = 4096;
 ///
 /// What is looked at together lies in arrays of its own: most of the time goes into walking along the trees.
 #[derive(Debug, Default)]
-pub(super) struct GridFlow {
+pub(crate) struct GridFlow {
     /// Residual capacity from the source (above zero) or to the sink (below zero). The first node of this and all that follow is
     /// [`NOWHERE`].
     excess: Vec<i32>,
@@ -70,7 +70,7 @@ struct ArcBetween {
 
 impl GridFlow {
     /// Empties the network; its nodes are numbered from 1 to `count`.
-    pub(super) fn reset(&mut self, count: usize) {
+    pub(crate) fn reset(&mut self, count: usize) {
         self.clock = 0;
         self.active.clear();
         self.orphans.clear();
@@ -87,13 +87,13 @@ impl GridFlow {
     }
 
     /// Makes it cost `amount` (below zero: gain) to have `node` on the sink's side.
-    pub(super) fn add_sink_side_cost(&mut self, node: usize, amount: i32) {
+    pub(crate) fn add_sink_side_cost(&mut self, node: usize, amount: i32) {
         self.excess[node] = self.excess[node].saturating_add(amount);
     }
 
     /// Makes it cost `there` to have a node on the source's side and the `other`, its neighbor in `direction`, on the sink's, and
     /// `back` for the reverse; both at least 0.
-    pub(super) fn add_arcs(&mut self, [node, other]: [usize; 2], direction: usize, there: i32, back: i32) {
+    pub(crate) fn add_arcs(&mut self, [node, other]: [usize; 2], direction: usize, there: i32, back: i32) {
         // Nodes are numbered by 32 bits where pixels are.
         self.neighbors[node][direction] = other as u32;
         self.residual[node][direction] += there;
@@ -115,7 +115,7 @@ impl GridFlow {
     }
 
     /// Finds the minimum cut. Afterwards [`Self::on_sink_side`] tells the sides.
-    pub(super) fn solve(&mut self) {
+    pub(crate) fn solve(&mut self) {
         if self.excess.len() < WORTH_HALVING {
             self.plant();
         } else {
@@ -224,7 +224,7 @@ impl GridFlow {
     }
 
     /// Whether `node` is on the sink's side of the minimum cut that is nearest to the sink.
-    pub(super) fn on_sink_side(&self, node: usize) -> bool {
+    pub(crate) fn on_sink_side(&self, node: usize) -> bool {
         self.tree[node] == SINK
     }
 
