@@ -71,8 +71,23 @@ impl<'a> PredictedOverlap<'a> {
             };
             (0..side * side).filter(is_shown).count() as f64 / (side * side) as f64
         };
-        let of_a = share(self.frame_a, self.frame_b, &|point| self.b_from_a(point));
-        of_a.max(share(self.frame_b, self.frame_a, &|point| self.a_from_b(point)))
+        let [is_b_missed, is_a_missed] = self.misses(margin);
+        let of_a = if is_b_missed { 0.0 } else { share(self.frame_a, self.frame_b, &|point| self.b_from_a(point)) };
+        let of_b = if is_a_missed { 0.0 } else { share(self.frame_b, self.frame_a, &|point| self.a_from_b(point)) };
+        of_a.max(of_b)
+    }
+
+    /// Whether a is seen to miss b, which reaches `margin` of its sides beyond each border, and b to miss such an a. Most photographs that paths over
+    /// overlaps lead to are far apart, which four corners tell in place of all places. Of a turn nothing is seen.
+    fn misses(&self, margin: f64) -> [bool; 2] {
+        let Maps::Homographies { b_from_a, a_from_b } = &self.maps else { return [false; 2] };
+        // What is linear in a place is negative at all of them where it is at their corners.
+        let misses = |map: &Homography, frame: &WorkingFrame, other: &WorkingFrame| {
+            let corners = corners(frame);
+            let is_beyond = |line: &Vector3<f64>| corners.iter().all(|corner| side(line, corner) < 0.0);
+            is_beyond(&map.0.row(2).transpose()) || borders(map, other, margin).iter().any(is_beyond)
+        };
+        [misses(b_from_a, self.frame_a, self.frame_b), misses(a_from_b, self.frame_b, self.frame_a)]
     }
 
     /// Whether both ends of a match lie in the overlap.
@@ -96,21 +111,30 @@ impl<'a> PredictedOverlap<'a> {
 
     /// The corners of the overlap, a convex polygon in a; empty if there is none.
     fn corners_in_a(&self, b_from_a: &Homography) -> Vec<Vector2<f64>> {
-        let (width, height) = (self.frame_a.width, self.frame_a.height);
-        let mut polygon = vec![
-            Vector2::new(0.0, 0.0),
-            Vector2::new(width, 0.0),
-            Vector2::new(width, height),
-            Vector2::new(0.0, height),
-        ];
-        // Inside b means 0 <= x/w <= W and 0 <= y/w <= H with w > 0: linear in the point of a.
-        let rows: [Vector3<f64>; 3] = std::array::from_fn(|row| b_from_a.0.row(row).transpose());
-        let [x, y, w] = rows;
-        for line in [x, w * self.frame_b.width - x, y, w * self.frame_b.height - y] {
-            polygon = clip(&polygon, &line);
-        }
-        polygon
+        let start = corners(self.frame_a).to_vec();
+        borders(b_from_a, self.frame_b, 0.0).iter().fold(start, |polygon, line| clip(&polygon, line))
     }
+}
+
+/// The corners of a photograph, one after the other around it.
+fn corners(frame: &WorkingFrame) -> [Vector2<f64>; 4] {
+    let (width, height) = (frame.width, frame.height);
+    [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]].map(Vector2::from)
+}
+
+/// The lines (x, y, 1) that are not negative where a point is carried into `target`, which reaches `margin` of its sides beyond each border: there
+/// -m W <= x/w <= (1 + m) W and the like of y, with w > 0, is linear in the point.
+fn borders(target_from_source: &Homography, target: &WorkingFrame, margin: f64) -> [Vector3<f64>; 4] {
+    let rows: [Vector3<f64>; 3] = std::array::from_fn(|row| target_from_source.0.row(row).transpose());
+    let [x, y, w] = rows;
+    let between = |at: Vector3<f64>, length: f64| [at + w * (margin * length), w * ((1.0 + margin) * length) - at];
+    let ([left, right], [top, bottom]) = (between(x, target.width), between(y, target.height));
+    [left, right, top, bottom]
+}
+
+/// What a line (x, y, 1) says of a point.
+fn side(line: &Vector3<f64>, point: &Vector2<f64>) -> f64 {
+    line.x * point.x + line.y * point.y + line.z
 }
 
 fn in_front(target_from_source: &Homography, point: Vector2<f64>) -> Option<Vector2<f64>> {
@@ -119,11 +143,10 @@ fn in_front(target_from_source: &Homography, point: Vector2<f64>) -> Option<Vect
 
 /// The part of a convex polygon where `line` (x, y, 1) is not negative (one step of Sutherland and Hodgman).
 fn clip(polygon: &[Vector2<f64>], line: &Vector3<f64>) -> Vec<Vector2<f64>> {
-    let side = |point: &Vector2<f64>| line.x * point.x + line.y * point.y + line.z;
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (index, from) in polygon.iter().enumerate() {
         let to = &polygon[(index + 1) % polygon.len()];
-        let (side_from, side_to) = (side(from), side(to));
+        let (side_from, side_to) = (side(line, from), side(line, to));
         if side_from >= 0.0 {
             kept.push(*from);
         }
@@ -178,6 +201,35 @@ mod tests {
             let overlap = PredictedOverlap::new(b_from_a, &frame, &frame).expect("regular");
             assert_eq!(overlap.larger_share(10, 0.0), 1.0);
         }
+    }
+
+    /// Against the places one by one, whatever the turn. With a margin of a twentieth, 40 px, photographs of 60 degrees (a focal length of 693 px) share
+    /// nothing from 30 + atan(440 / 693) = 62.4 degrees on, those of 90 (400 px) from 45 + atan(440 / 400) = 92.7 on, past the horizon, too.
+    #[test]
+    fn shares_are_those_of_all_places_where_corners_tell_that_there_are_none() {
+        let frame = frame();
+        let mut missed = 0;
+        for view_deg in [60.0, 90.0] {
+            for turn_deg in (0..360).step_by(10).map(f64::from) {
+                let b_from_a = turned(view_deg, turn_deg);
+                let a_from_b = turned(view_deg, -turn_deg);
+                let shown = |map: &Homography| {
+                    let place = |k: usize| Vector2::new((k % 10) as f64 / 9.0 * 800.0, (k / 10) as f64 / 9.0 * 600.0);
+                    let is_shown = |k: &usize| {
+                        let mapped = map.0 * place(*k).push(1.0);
+                        let (x, y) = (mapped.x / mapped.z, mapped.y / mapped.z);
+                        mapped.z > 0.0 && (-40.0..=840.0).contains(&x) && (-30.0..=630.0).contains(&y)
+                    };
+                    (0..100).filter(is_shown).count() as f64 / 100.0
+                };
+                let overlap = PredictedOverlap::new(b_from_a, &frame, &frame).expect("regular");
+                let expected = shown(&b_from_a).max(shown(&a_from_b));
+                assert_eq!(overlap.larger_share(10, 0.05), expected, "{view_deg} {turn_deg}");
+                missed += usize::from(overlap.misses(0.05) == [true; 2]);
+            }
+        }
+        // Of turns by tens those from 70 to 290 degrees, and from 100 to 260.
+        assert_eq!(missed, 23 + 17);
     }
 
     #[test]
