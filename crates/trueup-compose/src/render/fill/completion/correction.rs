@@ -3,7 +3,8 @@
 use super::labelling::{Energy, Shown};
 use super::part::beside;
 
-/// Most of a difference that is corrected, root of light, as the light of a sky differs from place to place: of what differs by more, something ends there.
+/// Most of a difference of pictures that is corrected, root of light, as the light of a sky differs from place to place: of what differs by more, something ends
+/// there.
 const MOST: f32 = 0.1;
 
 /// Rounds of successive overrelaxation, and how far beyond the mean of its neighbors each sample is moved: what is left of a difference after these is a
@@ -22,9 +23,9 @@ pub(super) fn of(energy: &Energy<'_>, shown: &[Shown]) -> Vec<[f32; 3]> {
     let mut place = vec![None; part.usable.len()];
     part.gap.iter().enumerate().for_each(|(index, &at)| place[at] = Some(index));
     let is_border = part.is_border();
-    let less = |one: Option<[f32; 3]>, other: Option<[f32; 3]>| {
+    let less = |one: Option<[f32; 3]>, other: Option<[f32; 3]>, most: f32| {
         let pair = one.zip(other);
-        pair.map_or([0.0; 3], |(one, other)| [0, 1, 2].map(|k| (one[k] - other[k]).clamp(-MOST, MOST)))
+        pair.map_or([0.0; 3], |(one, other)| [0, 1, 2].map(|k| (one[k] - other[k]).clamp(-most, most)))
     };
     // Of each neighbor of a sample, its own place in the gap, and what it is lower by.
     let steps = |(index, &at): (usize, &usize)| -> Vec<(Option<usize>, [f32; 3])> {
@@ -32,10 +33,12 @@ pub(super) fn of(energy: &Energy<'_>, shown: &[Shown]) -> Vec<[f32; 3]> {
         let step = |other: usize| match place[other] {
             Some(beside) => {
                 let label = shown[beside];
-                let [here, there] = [at, other].map(|at| less(energy.color(at, label), energy.color(at, own)));
+                // Nothing ends where the smooth surface begins.
+                let most = if own == 0 || label == 0 { f32::INFINITY } else { MOST };
+                let [here, there] = [at, other].map(|at| less(energy.color(at, label), energy.color(at, own), most));
                 Some((Some(beside), [0, 1, 2].map(|k| 0.5 * (here[k] + there[k]))))
             }
-            None => is_border[other].then(|| (None, less(part.colors[other], energy.color(other, own)))),
+            None => is_border[other].then(|| (None, less(part.colors[other], energy.color(other, own), MOST))),
         };
         beside(at, width, part.rows.len()).filter_map(step).collect()
     };
