@@ -80,6 +80,7 @@ mod tests {
             border: vec![[0, 1], [5, 4]],
             usable: (0..12).map(|at| at >= 6).collect(),
             colors: colors.collect(),
+            reach_down: 0,
         }
     }
 

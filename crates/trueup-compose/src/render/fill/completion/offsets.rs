@@ -35,7 +35,7 @@ struct Stretch {
 /// # Departures
 /// These are those that fit the border, each a stretch of it, rather than those at which patches repeat most often: of clouds, none do.
 pub(super) fn of(part: &Part) -> Vec<[isize; 2]> {
-    let [width, height] = [part.width(), part.rows.len()];
+    let [width, height] = [part.width(), part.rows.len().min(part.reach_down)];
     let tried = |step: usize| (2 * width / step + 1) * (2 * height / step + 1);
     let step = (1..).find(|&step| tried(step) <= MOST_TRIED).unwrap_or(1);
     let along = |length: usize| {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::samples::Samples;
+use super::samples::{Samples, reach};
 use crate::window::{near, widened};
 
 /// Width of the border that what fills a gap must fit, as a share of the gap's depth, and fewest and most samples.
@@ -61,6 +61,8 @@ pub(super) struct Part {
     /// Whether a sample may be shown in the gap.
     pub(super) usable: Vec<bool>,
     pub(super) colors: Vec<Option<[f32; 3]>>,
+    /// How far above or below a place what is shown there may lie.
+    pub(super) reach_down: usize,
 }
 
 impl Part {
@@ -99,8 +101,10 @@ impl Part {
             let (first, last) = gap.iter().map(places).fold((usize::MAX, 0), |(a, b), at| (a.min(at), b.max(at)));
             first..last + 1
         };
-        let columns = widened(&hull(&|at| at % samples.columns), samples.reach[0], samples.columns);
-        let rows = widened(&hull(&|at| at / samples.columns), samples.reach[1], samples.rows);
+        let depth = depth(&gap, samples.columns, samples.rows, |at| samples.open[at]);
+        let [beside, reach_down] = reach(depth as f64);
+        let columns = widened(&hull(&|at| at % samples.columns), beside, samples.columns);
+        let rows = widened(&hull(&|at| at / samples.columns), reach_down, samples.rows);
         let width = columns.len();
         let own = |at: usize| (at / samples.columns - rows.start) * width + at % samples.columns - columns.start;
         let mut gap: Vec<usize> = gap.into_iter().map(own).collect();
@@ -109,7 +113,6 @@ impl Part {
         let count = width * rows.len();
         let colors: Vec<Option<[f32; 3]>> = (0..count).map(|at| samples.colors[on_canvas(at)]).collect();
         let is_whole = |at: usize| samples.whole[on_canvas(at)] && colors[at].is_some();
-        let depth = depth(&gap, width, rows.len(), |at| samples.open[on_canvas(at)]);
         let wide = ((BORDER * depth as f64) as usize).clamp(BORDERS[0], BORDERS[1]);
         let border = border(&gap, width, rows.len(), wide, is_whole);
         let deviations: Vec<f32> = (0..count).map(|at| samples.deviations[on_canvas(at)]).collect();
@@ -133,7 +136,7 @@ impl Part {
         };
         let of_kind: Vec<bool> = (0..count).map(is_of_kind).collect();
         let usable = (0..count).map(|at| square(at, 1).all(|other| of_kind[other])).collect();
-        Self { columns, rows, gap, border, usable, colors }
+        Self { columns, rows, gap, border, usable, colors, reach_down }
     }
 
     pub(super) fn width(&self) -> usize {

@@ -12,13 +12,20 @@ use crate::window::widened;
 /// Samples of what is composed, at most: what is filled is looked for among so many, and only around gaps.
 const MOST_SAMPLES: usize = 1 << 15;
 
-/// Samples beside gaps, and above and below them, among which what fills them is looked for: as a multiple of the depth of the deepest, and at least. What lies
-/// at another height is another thing.
-const REACH: [f64; 2] = [4.0, 3.0];
+/// How far beside a gap lies what may fill it, as a multiple of its depth.
+const REACH: f64 = 4.0;
+
+/// Samples beside a gap, at least; and above and below it, beyond its depth.
 const LEAST_REACH: usize = 16;
 
 /// Rows of samples that are read at once; a number of threads must not show in the panorama.
 const ROWS_AT_ONCE: usize = 32;
+
+/// Samples beside a gap, and above and below it, among which what fills it is looked for, by its `depth`: the samples from its border to its middle. What lies
+/// at another height is another thing.
+pub(super) fn reach(depth: f64) -> [usize; 2] {
+    [((REACH * depth) as usize).max(LEAST_REACH), depth as usize + LEAST_REACH]
+}
 
 /// Means of squares of pixels around gaps. Sample i lies on the middle of pixel `i << level` of the canvas.
 #[derive(Debug)]
@@ -70,7 +77,7 @@ impl Samples {
             deviations: vec![0.0; columns * rows],
             open: vec![false; columns * rows],
             whole: vec![false; columns * rows],
-            reach: REACH.map(|reach| ((reach * depth) as usize >> level).max(LEAST_REACH)),
+            reach: reach(depth / f64::from(1 << level)),
         };
         samples.find_open(canvas);
         samples.find_whole(canvas);
