@@ -1,4 +1,4 @@
-//! Which empty cells may be filled: those beside which the picture is so smooth that a smooth surface goes on as it would.
+//! Which empty cells may be filled: those beside which the picture is so smooth that what is filled goes on as it would.
 
 use super::cells::{Cells, near};
 use super::worth::box_means;

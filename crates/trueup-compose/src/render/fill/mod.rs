@@ -50,14 +50,16 @@ impl Shade for SumPixel {
 }
 
 impl Panorama {
-    /// Fills the gaps with a smooth surface that has the grain of what lies beside it, and returns how many pixels that were;
-    /// `gaps` are those of the layout it was made of. The same pixels come out however the panorama is held.
+    /// Fills the gaps with a smooth surface that has the grain of what lies beside it, or where that differs more from place to place, with what
+    /// the panorama shows elsewhere; returns how many pixels that were. `gaps` are those of the layout it was made of. The same pixels
+    /// come out however the panorama is held.
     ///
     /// # Errors
     /// [`trueup_core::Error::Io`] if a scratch file cannot be read or written; [`trueup_core::Error::Cancelled`].
     ///
     /// # Source
-    /// Push-pull: Gortler, Grzeszczuk, Szeliski, Cohen, "The lumigraph", SIGGRAPH 1996, section 3.4.
+    /// The surface by push-pull: Gortler, Grzeszczuk, Szeliski, Cohen, "The lumigraph", SIGGRAPH 1996, section 3.4. What is shown elsewhere by
+    /// few offsets: He, Sun, "Statistics of patch offsets for image completion", ECCV 2012.
     ///
     /// # Departures
     /// Only what lies beside a gap is carried into it, and what is of another kind than the border around it is not.
