@@ -9,7 +9,7 @@ use crate::max_flow::{DOWN, GridFlow, RIGHT};
 /// Costs are whole numbers of such steps of roots of light.
 const STEPS: f32 = 4096.0;
 
-/// Cost of what may not be shown: more than a whole gap of other costs.
+/// Cost of what may not be shown: more than a sample, its border and its four seams cost together, so that no cut is cheaper with it.
 const FORBIDDEN: i32 = 1 << 22;
 
 /// How much more a step at the border costs than one within the gap: of photographs beside what lies elsewhere, more is seen.
