@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::coverage::{Coverage, Rectangle};
 use crate::distance::border_distances;
+use crate::flood;
 use crate::layout::CanvasLayout;
 use crate::window::{common, near};
 
@@ -204,26 +205,13 @@ fn deepest(coverage: &Coverage, rectangle: &Rectangle, is_turn: bool) -> f64 {
     let middle = |index: usize, range: &Range<usize>| (range.start + index * cell + cell / 2).min(range.end - 1);
     let is_covered =
         |at: &usize| coverage.holds(middle(at % columns, &rectangle.columns), middle(at / columns, &rectangle.rows));
-    let mut front: Vec<usize> = (0..columns * rows).filter(is_covered).collect();
-    let mut is_reached = vec![false; columns * rows];
-    front.iter().for_each(|&at| is_reached[at] = true);
-    let mut steps = 0;
-    while !front.is_empty() {
-        let mut next = Vec::new();
-        for at in front {
-            let (x, y) = (at % columns, at / columns);
-            for v in y.saturating_sub(1)..(y + 2).min(rows) {
-                for u in near(x, 1, columns, is_turn) {
-                    if !std::mem::replace(&mut is_reached[v * columns + u], true) {
-                        next.push(v * columns + u);
-                    }
-                }
-            }
-        }
-        steps += 1;
-        front = next;
-    }
-    f64::from(steps) * DIAGONAL * cell as f64
+    let around = |at: usize| {
+        let (x, y) = (at % columns, at / columns);
+        near(y, 1, rows, false).flat_map(move |v| near(x, 1, columns, is_turn).map(move |u| v * columns + u))
+    };
+    let covered = (0..columns * rows).filter(is_covered).collect();
+    let steps = flood::rounds(covered, &mut vec![false; columns * rows], around);
+    steps as f64 * DIAGONAL * cell as f64
 }
 
 impl SmallGaps {

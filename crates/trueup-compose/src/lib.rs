@@ -29,6 +29,7 @@ mod bulk;
 mod coverage;
 mod deformed_grid;
 mod distance;
+mod flood;
 mod handed_over;
 mod ignored;
 mod kernel;

@@ -101,6 +101,23 @@ impl GridFlow {
         self.residual[other][direction ^ 2] += back;
     }
 
+    /// Adds what a seam costs between two neighbors that may both change: `keep_both` while neither does, `second_changes` and `first_changes` if one
+    /// alone does; nothing if both do. Who changes is on the sink's side.
+    ///
+    /// # Source
+    /// Kolmogorov, Zabih, "What energy functions can be minimized via graph cuts?", IEEE TPAMI 26(2), 2004, section 4.
+    pub(crate) fn add_seam(
+        &mut self,
+        [first, second]: [usize; 2],
+        direction: usize,
+        [keep_both, second_changes, first_changes]: [i32; 3],
+    ) {
+        self.add_sink_side_cost(first, first_changes - keep_both);
+        self.add_sink_side_cost(second, -first_changes);
+        // Rounding may make a seam dearer by one step than the two that stand for it.
+        self.add_arcs([first, second], direction, (second_changes + first_changes - keep_both).max(0), 0);
+    }
+
     fn neighbor(&self, node: usize, direction: usize) -> usize {
         self.neighbors[node][direction] as usize
     }

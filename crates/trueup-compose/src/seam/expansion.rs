@@ -201,10 +201,7 @@ impl Expansions {
                 let keep_both = energy.seam_cost(p, a, q, b);
                 let q_changes = energy.seam_cost(p, a, q, label);
                 let p_changes = energy.seam_cost(p, label, q, b);
-                self.flow.add_sink_side_cost(at_p, p_changes - keep_both);
-                self.flow.add_sink_side_cost(at_q, -p_changes);
-                // Rounding may miss the triangle inequality by one.
-                self.flow.add_arcs([at_p, at_q], direction, (q_changes + p_changes - keep_both).max(0), 0);
+                self.flow.add_seam([at_p, at_q], direction, [keep_both, q_changes, p_changes]);
             }
             (Some((at_p, _)), None) => {
                 let change = energy.seam_cost(p, label, q, b) - energy.seam_cost(p, a, q, b);

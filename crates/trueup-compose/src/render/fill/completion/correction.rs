@@ -20,7 +20,7 @@ const OVERRELAXATION: f32 = 1.8;
 pub(super) fn of(energy: &Energy<'_>, shown: &[Shown]) -> Vec<[f32; 3]> {
     let part = energy.part;
     let width = part.width();
-    let mut place = vec![None; part.usable.len()];
+    let mut place = vec![None; part.colors.len()];
     part.gap.iter().enumerate().for_each(|(index, &at)| place[at] = Some(index));
     let is_border = part.is_border();
     let less = |one: Option<[f32; 3]>, other: Option<[f32; 3]>, most: f32| {
@@ -81,14 +81,17 @@ mod tests {
             usable: (0..12).map(|at| at >= 6).collect(),
             colors: colors.collect(),
             reach_down: 0,
+            rough: vec![0.2; 4],
         }
     }
 
     #[test]
     fn a_rough_border_asks_for_what_lies_elsewhere_and_an_even_one_for_the_surface() {
-        let part = row([0.35, 0.25], 0.3);
         let smooth = vec![Some([0.3; 3]); 12];
-        let shown = |rough: f32| labelling::of(&Energy::of(&part, &[[6, 0]], &smooth, &[rough; 4]));
+        let shown = |rough: f32| {
+            let part = Part { rough: vec![rough; 4], ..row([0.35, 0.25], 0.3) };
+            labelling::of(&Energy::of(&part, &[[6, 0]], &smooth))
+        };
         assert_eq!([shown(0.0), shown(0.2)], [vec![0; 4], vec![1; 4]]);
     }
 
@@ -97,7 +100,7 @@ mod tests {
     fn a_step_at_the_border_becomes_a_slope() {
         let part = row([0.35, 0.25], 0.3);
         let smooth = vec![None; 12];
-        let added = of(&Energy::of(&part, &[[6, 0]], &smooth, &[1.0; 4]), &[1; 4]);
+        let added = of(&Energy::of(&part, &[[6, 0]], &smooth), &[1; 4]);
         for (added, expected) in added.iter().zip([0.03, 0.01, -0.01, -0.03]) {
             assert!((added[0] - expected).abs() < 1e-3, "{added:?} instead of {expected}");
         }
@@ -107,7 +110,7 @@ mod tests {
     #[test]
     fn what_ends_at_the_border_stays_a_step() {
         let part = row([0.6, 0.6], 0.3);
-        let added = of(&Energy::of(&part, &[[6, 0]], &[None; 12], &[1.0; 4]), &[1; 4]);
+        let added = of(&Energy::of(&part, &[[6, 0]], &[None; 12]), &[1; 4]);
         assert!(added.iter().all(|added| (added[0] - 0.1).abs() < 1e-3), "{added:?}");
     }
 }

@@ -1,9 +1,7 @@
 //! Which offset each sample of a gap is filled from.
 
-use rayon::prelude::*;
-
-use super::offsets::difference;
-use super::part::{Part, beside};
+use super::part::Part;
+use super::samples::difference;
 use crate::max_flow::{DOWN, GridFlow, RIGHT};
 
 /// Costs are whole numbers of such steps of roots of light.
@@ -14,10 +12,6 @@ const FORBIDDEN: i32 = 1 << 22;
 
 /// How much more a step at the border costs than one within the gap: of photographs beside what lies elsewhere, more is seen.
 const BORDER_WEIGHT: f32 = 2.0;
-
-/// Differences beside each other that noise and the slope of a sky make, distance of roots of light. Of such borders, nothing is more like them
-/// than the smooth surface.
-const EVEN: f32 = 3.0 / 255.0;
 
 /// Rounds of expansions, at most.
 const ROUNDS: usize = 2;
@@ -45,7 +39,7 @@ pub(super) struct Energy<'a> {
 /// The smooth surface is one of the labels.
 pub(super) fn of(energy: &Energy<'_>) -> Vec<Shown> {
     let &Energy { part, offsets, .. } = energy;
-    let mut place = vec![0_u32; part.usable.len()];
+    let mut place = vec![0_u32; part.colors.len()];
     (1..).zip(&part.gap).for_each(|(node, &at)| place[at] = node);
     let mut shown = vec![0; part.gap.len()];
     let mut flow = GridFlow::default();
@@ -61,9 +55,9 @@ pub(super) fn of(energy: &Energy<'_>) -> Vec<Shown> {
 }
 
 impl<'a> Energy<'a> {
-    pub(super) fn of(part: &'a Part, offsets: &'a [[isize; 2]], smooth: &'a [Option<[f32; 3]>], rough: &[f32]) -> Self {
+    pub(super) fn of(part: &'a Part, offsets: &'a [[isize; 2]], smooth: &'a [Option<[f32; 3]>]) -> Self {
         let mut energy = Self { part, offsets, smooth, own: Vec::new() };
-        let mut borders = vec![Vec::new(); part.usable.len()];
+        let mut borders = vec![Vec::new(); part.colors.len()];
         part.border.iter().for_each(|&[at, nearest]| borders[nearest].push(at));
         let cost = |(at, rough): (usize, f32), label: usize| {
             if label > 0 && part.source(at, offsets[label - 1]).is_none() {
@@ -75,7 +69,7 @@ impl<'a> Energy<'a> {
             ((BORDER_WEIGHT * border + smooth) * STEPS) as i32
         };
         let of_sample = |sample| (0..=offsets.len()).map(|label| cost(sample, label)).collect();
-        energy.own = part.gap.iter().copied().zip(rough.iter().copied()).map(of_sample).collect();
+        energy.own = part.gap.iter().copied().zip(part.rough.iter().copied()).map(of_sample).collect();
         energy
     }
 
@@ -114,12 +108,8 @@ impl<'a> Energy<'a> {
             for (other, direction) in [right, below].into_iter().flatten() {
                 let Some(beside) = (place[other] as usize).checked_sub(1) else { continue };
                 let (one, two) = (shown[index], shown[beside]);
-                let [both_stay, second, first] =
-                    [[one, two], [one, label], [label, two]].map(|labels| self.seam([at, other], labels));
-                flow.add_sink_side_cost(index + 1, first - both_stay);
-                flow.add_sink_side_cost(beside + 1, -first);
-                // Rounding may leave a seam by a step dearer than two others.
-                flow.add_arcs([index + 1, beside + 1], direction, (second + first - both_stay).max(0), 0);
+                let seams = [[one, two], [one, label], [label, two]].map(|labels| self.seam([at, other], labels));
+                flow.add_seam([index + 1, beside + 1], direction, seams);
             }
         }
         flow.solve();
@@ -132,34 +122,4 @@ impl<'a> Energy<'a> {
         }
         changes
     }
-}
-
-/// How much the border beside each sample of a gap differs from sample to sample, beyond what noise does: of the nearest stretch of the border, what
-/// a third of it exceeds. So one lamp in an even sky is nothing, and clouds are something.
-pub(super) fn roughness(part: &Part) -> Vec<f32> {
-    /// Samples of the border that a sample is judged by, at most.
-    const ASKED: usize = 64;
-    /// Share of them that differs by less.
-    const RANK: f32 = 0.67;
-    let is_border = part.is_border();
-    let step = |at: usize| {
-        let beside = beside(at, part.width(), part.rows.len()).filter(|&other| is_border[other]);
-        let (sum, count) = beside.fold((0.0, 0.0_f32), |(sum, count), other| {
-            (sum + difference(part.colors[at], part.colors[other]), count + 1.0)
-        });
-        sum / count.max(1.0)
-    };
-    let steps: Vec<(usize, f32)> = part.border.iter().map(|&[at, _]| (at, step(at))).collect();
-    let of_sample = |&at: &usize| {
-        let mut near: Vec<(usize, f32)> =
-            steps.iter().map(|&(other, step)| (part.distance_squared(at, other), step)).collect();
-        if near.len() > ASKED {
-            near.select_nth_unstable_by(ASKED, |one, other| one.0.cmp(&other.0).then(one.1.total_cmp(&other.1)));
-            near.truncate(ASKED);
-        }
-        let rank = (RANK * near.len() as f32) as usize;
-        near.sort_unstable_by(|one, other| one.1.total_cmp(&other.1));
-        near.get(rank).map_or(0.0, |&(_, step)| (step - EVEN).max(0.0))
-    };
-    part.gap.par_iter().map(of_sample).collect()
 }

@@ -1,13 +1,15 @@
 //! What the panorama shows elsewhere in gaps beside clouds, lawns and the like, which no smooth surface goes on as.
 //!
-//! [`samples`] is the panorama around gaps, reduced; [`part`] one gap, and what around it is of the kind of its border; [`offsets`] by which this
-//! goes on along the border; [`labelling`] which of them each place is filled from; [`correction`] what is added there, so that nothing ends in a step.
+//! [`samples`] is the panorama around gaps, reduced; [`part`] one gap; [`roughness`] how rough its border is, and [`kinds`] what around it is of the
+//! kind of that; [`offsets`] by which this goes on along the border; [`labelling`] which of them each place is filled from; [`correction`] what is added there, so that nothing ends in a step.
 
 mod correction;
 mod elsewhere;
+mod kinds;
 mod labelling;
 mod offsets;
 mod part;
+mod roughness;
 mod samples;
 
 use std::ops::Range;
@@ -67,15 +69,14 @@ impl Completion {
         };
         let filled = |part: &Part| {
             context.check_cancelled()?;
-            let rough = labelling::roughness(part);
-            let offsets = if rough.iter().any(|&rough| rough > 0.0) { offsets::of(part) } else { Vec::new() };
+            let offsets = offsets::of(part);
             if offsets.is_empty() {
                 return Ok(None);
             }
             let is_gap = part.is_gap();
             let smooth: Vec<Option<[f32; 3]>> =
                 (0..is_gap.len()).map(|at| if is_gap[at] { smooth(at, part) } else { part.colors[at] }).collect();
-            let energy = Energy::of(part, &offsets, &smooth, &rough);
+            let energy = Energy::of(part, &offsets, &smooth);
             let shown = labelling::of(&energy);
             let added = correction::of(&energy, &shown);
             Ok(shown.iter().any(|&shown| shown > 0).then_some(Filled { offsets, shown, added }))

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::part::Part;
+use super::samples::difference;
 
 /// Stretches of the border that offsets are looked for apart, at most, and samples of each, at least.
 const MOST_STRETCHES: usize = 16;
@@ -88,12 +89,6 @@ fn error(part: &Part, stretch: &Stretch, offset: [isize; 2]) -> Option<f32> {
         count += 1;
     }
     (count > 0 && enough(count, stretch.border.len())).then(|| sum / count as f32)
-}
-
-/// Distance of two colors, roots of light; the largest there is where one is not known.
-pub(super) fn difference(one: Option<[f32; 3]>, other: Option<[f32; 3]>) -> f32 {
-    const UNKNOWN: f32 = 1.732_050_8;
-    one.zip(other).map_or(UNKNOWN, |(one, other)| (0..3).map(|k| (one[k] - other[k]).powi(2)).sum::<f32>().sqrt())
 }
 
 /// The border in stretches of about one length, each with what lies beside it of the gap.

@@ -2,52 +2,19 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::samples::{Samples, reach};
-use crate::window::{near, widened};
+use super::{kinds, roughness};
+use crate::flood;
+use crate::window::widened;
 
 /// Width of the border that what fills a gap must fit, as a share of the gap's depth, and fewest and most samples.
 const BORDER: f64 = 0.25;
 const BORDERS: [usize; 2] = [2, 4];
 
-/// Most that a sample differs from one of the border that is of its kind, root of light.
-const SAME_COLOR: f32 = 0.08;
-
-/// The same of the deviation of its pixels, as a multiple and beyond it: a tree is as dark as the sky between clouds, but not as even.
-const SAME_DEVIATION: f32 = 1.5;
-
-/// The same of the mean deviation around that of the border, as a multiple of its own: a pavement is as gray as a tree's shade, but evener.
-const SAME_TEXTURE: f32 = 2.0;
-
-/// Deviations that are alike whatever their proportion: noise.
-const NOISE: f32 = 0.01;
-
-/// Half the side of the square of samples whose deviations are averaged.
-const TEXTURE: usize = 2;
-
-/// Least share of the border that is of the kind of what fills a gap: a lamp that ends at a border fills none.
-const LEAST_OF_BORDER: f32 = 0.02;
-
-/// Samples of a border that others are compared with, at most.
-const MOST_KINDS: usize = 512;
-
 /// Samples of a gap at least: in a smaller one, a smooth surface is not seen to be smooth.
 const LEAST_GAP: usize = 16;
-
-/// What a sample shows.
-struct Kind {
-    color: [f32; 3],
-    deviation: f32,
-    /// Mean deviation of the samples around it.
-    texture: f32,
-}
-
-impl Kind {
-    fn is_of(&self, border: &Self) -> bool {
-        (0..3).all(|k| (self.color[k] - border.color[k]).abs() <= SAME_COLOR)
-            && self.deviation <= SAME_DEVIATION * border.deviation + NOISE
-            && border.texture <= SAME_TEXTURE * self.texture + NOISE
-    }
-}
 
 /// A gap's samples and those around it, row by row.
 #[derive(Debug)]
@@ -58,6 +25,8 @@ pub(super) struct Part {
     pub(super) gap: Vec<usize>,
     /// The gap's borders: whole samples beside it, and for each one of the gap's nearest to it.
     pub(super) border: Vec<[usize; 2]>,
+    /// How much the border beside each sample of the gap differs from place to place; see [`roughness`].
+    pub(super) rough: Vec<f32>,
     /// Whether a sample may be shown in the gap.
     pub(super) usable: Vec<bool>,
     pub(super) colors: Vec<Option<[f32; 3]>>,
@@ -66,77 +35,59 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// The gaps that are one each, but for small ones and those that go across the ends of a full turn, whose columns are `once`.
+    /// The gaps that are one each, but for small ones, those whose border a smooth surface goes on, and those that go across the ends of a full turn, whose
+    /// columns are `once`.
     pub(super) fn all(samples: &Samples, once: &Range<usize>, around: bool) -> Vec<Self> {
-        let mut seen = vec![false; samples.open.len()];
-        let mut parts = Vec::new();
-        for start in 0..samples.open.len() {
-            if !samples.open[start] || seen[start] {
+        let mut is_open = samples.open.clone();
+        let mut gaps = Vec::new();
+        for start in 0..is_open.len() {
+            if !std::mem::take(&mut is_open[start]) {
                 continue;
             }
-            seen[start] = true;
             let mut gap = vec![start];
             let mut next = 0;
             while let Some(&at) = gap.get(next) {
                 next += 1;
-                for other in beside(at, samples.columns, samples.rows) {
-                    if samples.open[other] && !std::mem::replace(&mut seen[other], true) {
-                        gap.push(other);
-                    }
-                }
+                let further = beside(at, samples.columns, samples.rows);
+                gap.extend(further.filter(|&other| std::mem::take(&mut is_open[other])));
             }
             let across = |&at: &usize| {
                 let column = at % samples.columns;
                 column <= once.start >> samples.level || column > once.end >> samples.level
             };
             if gap.len() >= LEAST_GAP && !(around && gap.iter().any(across)) {
-                parts.push(Self::of(samples, gap));
+                gaps.push(gap);
             }
         }
-        parts
+        gaps.into_par_iter().filter_map(|gap| Self::of(samples, gap)).collect()
     }
 
-    fn of(samples: &Samples, gap: Vec<usize>) -> Self {
+    /// `None` if the border is even.
+    fn of(samples: &Samples, gap: Vec<usize>) -> Option<Self> {
         let hull = |places: &dyn Fn(&usize) -> usize| {
             let (first, last) = gap.iter().map(places).fold((usize::MAX, 0), |(a, b), at| (a.min(at), b.max(at)));
             first..last + 1
         };
-        let depth = depth(&gap, samples.columns, samples.rows, |at| samples.open[at]);
+        let depth = depth(&gap, samples);
         let [beside, reach_down] = reach(depth as f64);
         let columns = widened(&hull(&|at| at % samples.columns), beside, samples.columns);
         let rows = widened(&hull(&|at| at / samples.columns), reach_down, samples.rows);
-        let width = columns.len();
-        let own = |at: usize| (at / samples.columns - rows.start) * width + at % samples.columns - columns.start;
+        let own =
+            |at: usize| (at / samples.columns - rows.start) * columns.len() + at % samples.columns - columns.start;
         let mut gap: Vec<usize> = gap.into_iter().map(own).collect();
         gap.sort_unstable();
-        let on_canvas = |at: usize| (at / width + rows.start) * samples.columns + at % width + columns.start;
-        let count = width * rows.len();
-        let colors: Vec<Option<[f32; 3]>> = (0..count).map(|at| samples.colors[on_canvas(at)]).collect();
-        let is_whole = |at: usize| samples.whole[on_canvas(at)] && colors[at].is_some();
+        let colors: Vec<_> = samples.within(&columns, &rows).map(|at| samples.colors[at]).collect();
+        let is_whole: Vec<bool> =
+            samples.within(&columns, &rows).map(|at| samples.whole[at] && samples.colors[at].is_some()).collect();
         let wide = ((BORDER * depth as f64) as usize).clamp(BORDERS[0], BORDERS[1]);
-        let border = border(&gap, width, rows.len(), wide, is_whole);
-        let deviations: Vec<f32> = (0..count).map(|at| samples.deviations[on_canvas(at)]).collect();
-        let square = |at: usize, reach: usize| {
-            let (x, y) = (at % width, at / width);
-            near(y, reach, rows.len(), false)
-                .flat_map(move |y| near(x, reach, width, false).map(move |x| y * width + x))
-        };
-        let texture = |at: usize| {
-            let known = square(at, TEXTURE).filter(|&other| is_whole(other));
-            let (sum, count) = known.fold((0.0, 0.0_f32), |(sum, count), other| (sum + deviations[other], count + 1.0));
-            sum / count.max(1.0)
-        };
-        let kind = |at: usize| colors[at].map(|color| Kind { color, deviation: deviations[at], texture: texture(at) });
-        let step = border.len().div_ceil(MOST_KINDS).max(1);
-        let kinds: Vec<Kind> = border.iter().step_by(step).filter_map(|&[at, _]| kind(at)).collect();
-        let least = (LEAST_OF_BORDER * kinds.len() as f32).max(1.0) as usize;
-        let is_of_kind = |at: usize| {
-            let own = kind(at).filter(|_| is_whole(at));
-            own.is_some_and(|own| kinds.iter().filter(|border| own.is_of(border)).take(least).count() == least)
-        };
-        let of_kind: Vec<bool> = (0..count).map(is_of_kind).collect();
-        let usable = (0..count).map(|at| square(at, 1).all(|other| of_kind[other])).collect();
-        Self { columns, rows, gap, border, usable, colors, reach_down }
+        let border = border(&gap, [columns.len(), rows.len()], wide, &is_whole);
+        let mut part = Self { columns, rows, gap, border, rough: Vec::new(), usable: Vec::new(), colors, reach_down };
+        part.rough = roughness::of(&part);
+        if part.rough.iter().all(|&rough| rough == 0.0) {
+            return None;
+        }
+        part.usable = kinds::usable(&part, samples, &is_whole);
+        Some(part)
     }
 
     pub(super) fn width(&self) -> usize {
@@ -145,16 +96,18 @@ impl Part {
 
     /// Which samples are the gap's own.
     pub(super) fn is_gap(&self) -> Vec<bool> {
-        let mut is_gap = vec![false; self.usable.len()];
-        self.gap.iter().for_each(|&at| is_gap[at] = true);
-        is_gap
+        self.are(self.gap.iter().copied())
     }
 
     /// Which samples are the gap's borders.
     pub(super) fn is_border(&self) -> Vec<bool> {
-        let mut is_border = vec![false; self.usable.len()];
-        self.border.iter().for_each(|&[at, _]| is_border[at] = true);
-        is_border
+        self.are(self.border.iter().map(|&[at, _]| at))
+    }
+
+    fn are(&self, samples: impl Iterator<Item = usize>) -> Vec<bool> {
+        let mut are = vec![false; self.colors.len()];
+        samples.for_each(|at| are[at] = true);
+        are
     }
 
     /// The square of the distance of two samples.
@@ -187,28 +140,15 @@ pub(super) fn beside(at: usize, columns: usize, rows: usize) -> impl Iterator<It
 }
 
 /// Steps from what is not open to the sample of a gap that is farthest from it.
-fn depth(gap: &[usize], columns: usize, rows: usize, is_open: impl Fn(usize) -> bool) -> usize {
-    let mut reached = vec![false; columns * rows];
-    let outer = |&at: &usize| beside(at, columns, rows).any(|other| !is_open(other));
-    let mut front: Vec<usize> = gap.iter().copied().filter(outer).collect();
-    front.iter().for_each(|&at| reached[at] = true);
-    let mut steps = 0;
-    while !front.is_empty() {
-        steps += 1;
-        let further = front.iter().flat_map(|&at| beside(at, columns, rows));
-        front = further.filter(|&at| is_open(at) && !std::mem::replace(&mut reached[at], true)).collect();
-    }
-    steps
+fn depth(gap: &[usize], samples: &Samples) -> usize {
+    let beside = |at: usize| beside(at, samples.columns, samples.rows);
+    let outer = gap.iter().copied().filter(|&at| beside(at).any(|other| !samples.open[other]));
+    let mut is_reached: Vec<bool> = samples.open.iter().map(|&open| !open).collect();
+    flood::rounds(outer.collect(), &mut is_reached, beside)
 }
 
 /// See [`Part::border`].
-fn border(
-    gap: &[usize],
-    columns: usize,
-    rows: usize,
-    wide: usize,
-    is_whole: impl Fn(usize) -> bool,
-) -> Vec<[usize; 2]> {
+fn border(gap: &[usize], [columns, rows]: [usize; 2], wide: usize, is_whole: &[bool]) -> Vec<[usize; 2]> {
     let mut reached = vec![false; columns * rows];
     gap.iter().for_each(|&at| reached[at] = true);
     let mut front: Vec<[usize; 2]> = gap.iter().map(|&at| [at, at]).collect();
@@ -217,7 +157,7 @@ fn border(
         let mut next = Vec::new();
         for &[at, nearest] in &front {
             for other in beside(at, columns, rows) {
-                if is_whole(other) && !std::mem::replace(&mut reached[other], true) {
+                if is_whole[other] && !std::mem::replace(&mut reached[other], true) {
                     next.push([other, nearest]);
                 }
             }

@@ -27,6 +27,12 @@ pub(super) fn reach(depth: f64) -> [usize; 2] {
     [((REACH * depth) as usize).max(LEAST_REACH), depth as usize + LEAST_REACH]
 }
 
+/// Distance of two colors, roots of light; the largest there is where one is not known.
+pub(super) fn difference(one: Option<[f32; 3]>, other: Option<[f32; 3]>) -> f32 {
+    const UNKNOWN: f32 = 1.732_050_8;
+    one.zip(other).map_or(UNKNOWN, |(one, other)| (0..3).map(|k| (one[k] - other[k]).powi(2)).sum::<f32>().sqrt())
+}
+
 /// Means of squares of pixels around gaps. Sample i lies on the middle of pixel `i << level` of the canvas.
 #[derive(Debug)]
 pub(super) struct Samples {
@@ -83,6 +89,12 @@ impl Samples {
         samples.find_whole(canvas);
         samples.read(canvas, store, context)?;
         Ok(samples)
+    }
+
+    /// The samples of a box, row by row.
+    pub(super) fn within(&self, columns: &Range<usize>, rows: &Range<usize>) -> impl Iterator<Item = usize> {
+        let (width, columns) = (self.columns, columns.clone());
+        rows.clone().flat_map(move |row| columns.clone().map(move |column| row * width + column))
     }
 
     /// Marks samples beside stretches of pixels of a row.
