@@ -105,13 +105,34 @@ impl Deviations {
     }
 }
 
+/// Largest turn of two overlapping cameras against each other that segments are believed about, degrees: as much as a camera shows that moved by 20 cm, as at the end
+/// of an arm, before what is 3 m away (reasoned). What parallax leaves open may be more; but furniture stands askew in rooms, and its edges are level, too.
+const MOST_TURN_DEG: f64 = 4.0;
+
+/// Which segments of a photograph are heard about its camera's turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Heard {
+    All,
+    Upright,
+    None,
+}
+
+impl Heard {
+    /// Fewer of them; `None` is none already.
+    fn fewer(self) -> Option<Self> {
+        match self {
+            Self::All => Some(Self::Upright),
+            Self::Upright => Some(Self::None),
+            Self::None => None,
+        }
+    }
+}
+
 /// The rotations with the turns that the segments ask for. The common frame stays; `frame`'s columns are the scene's
 /// directions in it.
 ///
-/// Minimizes sum over segments of weight (Geman-McClure) (residual / [`LINE_ERROR_PX`])^2 plus sum over overlaps of
-/// (w_i - w_j)^T information (w_i - w_j) over turns w_i in the common frame that sum to zero, by reweighted
-/// Gauss-Newton steps from a coarse to a fine scale of the loss. A turn of all cameras together is not sought: `frame`
-/// is the segments' own choice for these.
+/// Of a camera that would be turned against one that it overlaps by more than [`MOST_TURN_DEG`], the level segments are not heard, nor the
+/// upright ones if it still is.
 pub(super) fn corrected_rotations(
     rotations: &[Matrix3<f64>],
     certainties: &[RelativeCertainty],
@@ -119,28 +140,69 @@ pub(super) fn corrected_rotations(
     frame: &Matrix3<f64>,
     axis_weights: AxisWeights,
 ) -> Vec<Matrix3<f64>> {
+    let mut heard = vec![Heard::All; rotations.len()];
+    loop {
+        let asked = |index: usize, rotation: &Matrix3<f64>, scale: f64| match heard[index] {
+            Heard::All => vote.turn_equations(index, rotation, frame, axis_weights, scale),
+            Heard::Upright => vote.turn_equations(index, rotation, frame, axis_weights.upright_alone(), scale),
+            Heard::None => (Matrix3::zeros(), Vector3::zeros()),
+        };
+        let Some(turns) = turns(rotations, certainties, asked) else { return rotations.to_vec() };
+        let mut is_less = false;
+        for photograph in turned_too_far(&turns, certainties) {
+            if let Some(fewer) = heard[photograph].fewer() {
+                heard[photograph] = fewer;
+                is_less = true;
+            }
+        }
+        if !is_less {
+            let turned =
+                |(rotation, turn): (&Matrix3<f64>, &Vector3<f64>)| nearest_rotation(&(rotation * exp_rotation(turn)));
+            return rotations.iter().zip(&turns).map(turned).collect();
+        }
+    }
+}
+
+/// Of every two overlapping photographs that are turned against each other by more than [`MOST_TURN_DEG`] the one that is turned more, each once.
+fn turned_too_far(turns: &[Vector3<f64>], certainties: &[RelativeCertainty]) -> Vec<usize> {
+    let too_far = |one: &&RelativeCertainty| (turns[one.i] - turns[one.j]).norm() > MOST_TURN_DEG.to_radians();
+    let more = |one: &RelativeCertainty| if turns[one.j].norm() > turns[one.i].norm() { one.j } else { one.i };
+    let mut found: Vec<usize> = certainties.iter().filter(too_far).map(more).collect();
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// The turns that the segments ask for; `None` where they cannot be told. `asked`: the normal matrix and the gradient of what the segments of a photograph say of its
+/// rotation, at a scale of the loss.
+///
+/// Minimizes sum over segments of weight (Geman-McClure) (residual / [`LINE_ERROR_PX`])^2 plus sum over overlaps of
+/// (w_i - w_j)^T information (w_i - w_j) over turns w_i in the common frame whose mean is zero ([`TurnEquations`]), by reweighted
+/// Gauss-Newton steps from a coarse to a fine scale of the loss. A turn of all cameras together is not sought: `frame`
+/// is the segments' own choice for these.
+fn turns(
+    rotations: &[Matrix3<f64>],
+    certainties: &[RelativeCertainty],
+    asked: impl Fn(usize, &Matrix3<f64>, f64) -> (Matrix3<f64>, Vector3<f64>),
+) -> Option<Vec<Vector3<f64>>> {
     let mut turns = vec![Vector3::<f64>::zeros(); rotations.len()];
     let line_information = LINE_ERROR_PX.powi(-2);
     for scale in scales() {
-        let asked: Vec<(Matrix3<f64>, Vector3<f64>)> = rotations
+        let equations: Vec<(Matrix3<f64>, Vector3<f64>)> = rotations
             .iter()
             .zip(&turns)
             .enumerate()
             .map(|(index, (rotation, turn))| {
                 let turned = rotation * exp_rotation(turn);
-                let (normal, gradient) = vote.turn_equations(index, &turned, frame, axis_weights, scale);
+                let (normal, gradient) = asked(index, &turned, scale);
                 // The residual is linearized at the present turn; the unknown is the whole turn.
                 (normal * line_information, (normal * turn - gradient) * line_information)
             })
             .collect();
-        let (normals, right): (Vec<_>, Vec<_>) = asked.into_iter().unzip();
-        let Some(equations) = TurnEquations::new(&normals, certainties) else { return rotations.to_vec() };
-        turns = equations.solve(&right);
+        let (normals, right): (Vec<_>, Vec<_>) = equations.into_iter().unzip();
+        turns = TurnEquations::new(&normals, certainties)?.solve(&right);
     }
-    if turns.iter().any(|turn| !turn.iter().all(|value| value.is_finite())) {
-        return rotations.to_vec();
-    }
-    rotations.iter().zip(&turns).map(|(rotation, turn)| nearest_rotation(&(rotation * exp_rotation(turn)))).collect()
+    turns.iter().all(|turn| turn.iter().all(|value| value.is_finite())).then_some(turns)
 }
 
 /// Covariance of every camera's own turn in the common frame, rad^2: what its segments and its overlaps leave open of
@@ -251,5 +313,35 @@ mod tests {
         }
         let errors = scene.errors_deg(&scene.prior(&SimilarityOptions::default()));
         assert!(largest(&errors) < 0.15, "{errors:?}");
+    }
+
+    /// Of overlaps (0, 1) and (1, 2) the first is turned by 3 degrees, the second by 5, most of it the third photograph's.
+    #[test]
+    fn of_two_cameras_turned_too_far_the_one_that_is_turned_more_is_named() {
+        let turns = [-1.0_f64, 2.0, -3.0].map(|degrees| Vector3::new(0.0, degrees.to_radians(), 0.0));
+        let overlap = |i, j| RelativeCertainty { i, j, information: Matrix3::identity() };
+        assert_eq!(turned_too_far(&turns, &[overlap(0, 1), overlap(1, 2)]), [2]);
+        assert_eq!(turned_too_far(&turns, &[overlap(0, 1)]), [0_usize; 0]);
+    }
+
+    /// All segments of the first photograph are turned by six degrees, as furniture may be, and parallax leaves its overlaps open by more.
+    #[test]
+    fn segments_do_not_turn_cameras_farther_than_one_moves() {
+        let mut scene = sweep(0.0);
+        let (sine, cosine) = 6.0_f64.to_radians().sin_cos();
+        let center = Vector2::new(SIZE.0, SIZE.1) / 2.0;
+        for line in &mut scene.lines[0] {
+            for end in [&mut line.start, &mut line.end] {
+                let from = Vector2::from(*end) - center;
+                *end = (center + Vector2::new(cosine * from.x - sine * from.y, sine * from.x + cosine * from.y)).into();
+            }
+        }
+        for edge in scene.edges.iter_mut().filter(|edge| edge.a == 0 || edge.b == 0) {
+            for (number, one) in edge.inliers.iter_mut().enumerate() {
+                one.in_b[0] += if number % 20 < 10 { 60.0 } else { -60.0 };
+            }
+        }
+        let errors = scene.errors_deg(&scene.prior(&SimilarityOptions::default()));
+        assert!(largest(&errors) < 1.0, "{errors:?}");
     }
 }

@@ -1,7 +1,8 @@
-//! Turns of single cameras that sum to zero: what segments and overlaps ask of them, and what these leave open.
+//! Turns of single cameras whose mean is zero: what segments and overlaps ask of them, and what these leave open.
 //!
 //! Minimizes sum_i w_i^T N_i w_i - 2 r_i^T w_i plus sum over overlaps of (w_i - w_j)^T information (w_i - w_j), subject to
-//! sum_i w_i = 0. The overlaps tie each photograph to a few others, the condition all to one another: with its multipliers it is
+//! sum_i N_i w_i = 0: the mean is weighed by what the segments of each camera tell, so that cameras of which little is known need not turn
+//! against the others to even out what these are asked. The overlaps tie each photograph to a few others, the condition all to one another: with its multipliers it is
 //! eliminated by blocks, and so is the first photograph, without which the others cannot turn together unseen.
 
 use faer::linalg::solvers::Solve;
@@ -40,13 +41,14 @@ impl TurnEquations {
     /// undetermined or do not fit into memory.
     pub(super) fn new(normals: &[Matrix3<f64>], overlaps: &[RelativeCertainty]) -> Option<Self> {
         let count = normals.len().checked_sub(1).filter(|&others| others > 0)?;
+        let shares = shares(normals)?;
         let mut others = BlockMatrix::<3>::zeros(count);
         let mut first = Matrix3::identity() * HOLD + normals[0];
         // Columns of the first photograph's three unknowns, then of the three multipliers.
         let mut border = vec![SMatrix::<f64, 3, 6>::zeros(); count];
         for (k, normal) in normals.iter().enumerate().skip(1) {
             others.add(k - 1, k - 1, &(normal + Matrix3::identity() * HOLD));
-            border[k - 1].fixed_columns_mut::<3>(3).fill_with_identity();
+            border[k - 1].fixed_columns_mut::<3>(3).copy_from(&shares[k].transpose());
         }
         for &RelativeCertainty { i, j, information } in overlaps {
             for photograph in [i, j] {
@@ -70,8 +72,8 @@ impl TurnEquations {
             (0..count).map(|k| SMatrix::from_fn(|row, column| solved[(3 * k + row, column)])).collect();
         let mut last = Matrix6::zeros();
         last.fixed_view_mut::<3, 3>(0, 0).copy_from(&first);
-        last.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
-        last.fixed_view_mut::<3, 3>(3, 0).fill_with_identity();
+        last.fixed_view_mut::<3, 3>(0, 3).copy_from(&shares[0].transpose());
+        last.fixed_view_mut::<3, 3>(3, 0).copy_from(&shares[0]);
         for (border, along) in border.iter().zip(&along) {
             last -= border.transpose() * along;
         }
@@ -115,6 +117,13 @@ impl TurnEquations {
     }
 }
 
+/// What each photograph counts in the mean of all turns: N_i and [`HOLD`] by their sums, so that about an axis of which segments say nothing all count alike.
+fn shares(normals: &[Matrix3<f64>]) -> Option<Vec<Matrix3<f64>>> {
+    let held = |normal: &Matrix3<f64>| normal + Matrix3::identity() * HOLD;
+    let of_sum = normals.iter().map(held).sum::<Matrix3<f64>>().try_inverse()?;
+    Some(normals.iter().map(|normal| of_sum * held(normal)).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::{DMatrix, DVector};
@@ -134,12 +143,14 @@ mod tests {
     /// The whole matrix with the condition's multipliers, dense.
     fn dense(normals: &[Matrix3<f64>], overlaps: &[RelativeCertainty]) -> DMatrix<f64> {
         let turns = 3 * normals.len();
+        let sum: Matrix3<f64> = normals.iter().map(|normal| normal + Matrix3::identity()).sum();
         let mut matrix = DMatrix::zeros(turns + 3, turns + 3);
         for (k, normal) in normals.iter().enumerate() {
             let mut block = matrix.fixed_view_mut::<3, 3>(3 * k, 3 * k);
             block += normal + Matrix3::identity();
-            matrix.fixed_view_mut::<3, 3>(3 * k, turns).fill_with_identity();
-            matrix.fixed_view_mut::<3, 3>(turns, 3 * k).fill_with_identity();
+            let share = sum.try_inverse().expect("held") * (normal + Matrix3::identity());
+            matrix.fixed_view_mut::<3, 3>(3 * k, turns).copy_from(&share.transpose());
+            matrix.fixed_view_mut::<3, 3>(turns, 3 * k).copy_from(&share);
         }
         for one in overlaps {
             for (row, column, sign) in
@@ -174,8 +185,9 @@ mod tests {
             );
             let expected = &inverse * all;
             let turns = equations.solve(&right);
-            let sum: Vector3<f64> = turns.iter().sum();
-            assert!(sum.norm() < 1e-10, "{sum}");
+            let weighed: Vector3<f64> = turns.iter().zip(&normals).map(|(turn, normal)| normal * turn + turn).sum();
+            let alone: f64 = turns.iter().zip(&normals).map(|(turn, normal)| (normal * turn + turn).norm()).sum();
+            assert!(weighed.norm() < 1e-9 * alone, "{weighed} of {alone}");
             for (k, (turn, covariance)) in turns.iter().zip(equations.covariances()).enumerate() {
                 let off = (turn - expected.fixed_rows::<3>(3 * k)).norm() / expected.norm();
                 assert!(off < 1e-8, "{k}: {off}");
@@ -183,6 +195,19 @@ mod tests {
                 let off = (covariance - expected).norm() / expected.norm();
                 assert!(off < 1e-7, "{k}: {off}");
             }
+        }
+    }
+
+    /// By hand: three photographs in a row, of which the first two show segments that ask for turns of 0.02 and 0.01; the mean of both is taken off, and the third
+    /// follows the second. With turns that sum to zero it would be turned by 0.01 to the other side.
+    #[test]
+    fn a_camera_without_segments_follows_those_that_it_overlaps() {
+        let normals = [Matrix3::identity() * 1e8, Matrix3::identity() * 1e8, Matrix3::zeros()];
+        let right = [0.02, 0.01, 0.0].map(|turn| Vector3::new(turn * 1e8, 0.0, 0.0));
+        let overlap = |i, j| RelativeCertainty { i, j, information: Matrix3::identity() * 1e4 };
+        let turns = TurnEquations::new(&normals, &[overlap(0, 1), overlap(1, 2)]).expect("determined").solve(&right);
+        for (turn, expected) in turns.iter().zip([0.005, -0.005, -0.005]) {
+            assert!((turn.x - expected).abs() < 1e-5, "{turn} instead of {expected}");
         }
     }
 

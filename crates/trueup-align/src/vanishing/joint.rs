@@ -48,6 +48,11 @@ impl AxisWeights {
         Self { vertical, upright, level }
     }
 
+    /// The same for upright segments, none for level ones.
+    pub(crate) fn upright_alone(self) -> Self {
+        Self { level: 0.0, ..self }
+    }
+
     /// The factor of an axis.
     pub(crate) fn of(&self, axis: usize) -> f64 {
         if axis == self.vertical { self.upright } else { self.level }

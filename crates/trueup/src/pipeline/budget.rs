@@ -105,6 +105,8 @@ impl Budget {
         let Some(largest) = images.iter().max_by_key(|image| bytes(image)) else {
             return Ok(Measuring { at_once: usize::MAX, kept_bytes: 0, held_features: 0 });
         };
+        // Photographs are made smaller for measuring, never larger.
+        let working_pixels = working_pixels.min((bytes(largest) / PIXEL_BYTES) as f64);
         // One after the other: what is not kept of a photograph is let go before features are found in its working copy.
         let reduced = (REDUCED_BYTES * working_pixels) as usize;
         let features = ((FEATURE_BYTES * working_pixels) as usize).saturating_add(reduced);
@@ -223,6 +225,14 @@ mod tests {
         let many = budget("256MB").measuring(&images(500, 3264, 2448), WORKING_PIXELS).expect("enough");
         assert_eq!((many.at_once, many.held_features), (1, 160_000_000 - 117_360_000));
         assert!(budget("200MB").measuring(&images(1, 3264, 2448), WORKING_PIXELS).is_err());
+    }
+
+    /// Of 256 x 171 pixels, 43,776 are all there is to measure.
+    #[test]
+    fn small_photographs_take_little_however_many_pixels_are_allowed() {
+        let measuring = |pixels: f64| budget("256MB").measuring(&images(5, 256, 171), pixels).expect("enough");
+        assert_eq!(measuring(1e8), measuring(43_776.0));
+        assert_eq!(measuring(1e8).at_once, 160_000_000 / 10_700_000);
     }
 
     #[test]
