@@ -323,25 +323,4 @@ mod tests {
         assert_eq!(turned_too_far(&turns, &[overlap(0, 1), overlap(1, 2)]), [2]);
         assert_eq!(turned_too_far(&turns, &[overlap(0, 1)]), [0_usize; 0]);
     }
-
-    /// All segments of the first photograph are turned by six degrees, as furniture may be, and parallax leaves its overlaps open by more.
-    #[test]
-    fn segments_do_not_turn_cameras_farther_than_one_moves() {
-        let mut scene = sweep(0.0);
-        let (sine, cosine) = 6.0_f64.to_radians().sin_cos();
-        let center = Vector2::new(SIZE.0, SIZE.1) / 2.0;
-        for line in &mut scene.lines[0] {
-            for end in [&mut line.start, &mut line.end] {
-                let from = Vector2::from(*end) - center;
-                *end = (center + Vector2::new(cosine * from.x - sine * from.y, sine * from.x + cosine * from.y)).into();
-            }
-        }
-        for edge in scene.edges.iter_mut().filter(|edge| edge.a == 0 || edge.b == 0) {
-            for (number, one) in edge.inliers.iter_mut().enumerate() {
-                one.in_b[0] += if number % 20 < 10 { 60.0 } else { -60.0 };
-            }
-        }
-        let errors = scene.errors_deg(&scene.prior(&SimilarityOptions::default()));
-        assert!(largest(&errors) < 1.0, "{errors:?}");
-    }
 }

@@ -1,8 +1,8 @@
 //! Turns of single cameras whose mean is zero: what segments and overlaps ask of them, and what these leave open.
 //!
 //! Minimizes sum_i w_i^T N_i w_i - 2 r_i^T w_i plus sum over overlaps of (w_i - w_j)^T information (w_i - w_j), subject to
-//! sum_i N_i w_i = 0: the mean is weighed by what the segments of each camera tell, so that cameras of which little is known need not turn
-//! against the others to even out what these are asked. The overlaps tie each photograph to a few others, the condition all to one another: with its multipliers it is
+//! sum_i C_i w_i = 0: in this mean all cameras count alike of which segments tell something, and the others hardly, so that these need not turn
+//! against them to even out what they are asked. The overlaps tie each photograph to a few others, the condition all to one another: with its multipliers it is
 //! eliminated by blocks, and so is the first photograph, without which the others cannot turn together unseen.
 
 use faer::linalg::solvers::Solve;
@@ -14,6 +14,9 @@ use super::block_matrix::BlockMatrix;
 
 /// Information, 1 / rad^2, that keeps turns where neither segments nor overlaps say anything: far less than either says.
 const HOLD: f64 = 1.0;
+/// What segments tell of a photograph's turn for it to count half in the mean of all turns, as a share of what they tell of one in the mean. Counted by what they tell
+/// alone, ten rendered streets with parallax lean by 0.145 degrees in the mean instead of 0.130.
+const ENOUGH: f64 = 0.05;
 /// Photographs whose columns of the inverse are found at once. A number of its own, so that the sums are the same for any number of threads.
 const AT_ONCE: usize = 16;
 
@@ -117,11 +120,16 @@ impl TurnEquations {
     }
 }
 
-/// What each photograph counts in the mean of all turns: N_i and [`HOLD`] by their sums, so that about an axis of which segments say nothing all count alike.
+/// What each photograph counts in the mean of all turns, C_i: (N_i + [`ENOUGH`] of the mean N)^-1 N_i, by their sum. About an axis of which segments say nothing all
+/// count alike.
 fn shares(normals: &[Matrix3<f64>]) -> Option<Vec<Matrix3<f64>>> {
-    let held = |normal: &Matrix3<f64>| normal + Matrix3::identity() * HOLD;
-    let of_sum = normals.iter().map(held).sum::<Matrix3<f64>>().try_inverse()?;
-    Some(normals.iter().map(|normal| of_sum * held(normal)).collect())
+    let hold = Matrix3::identity() * HOLD;
+    let enough = normals.iter().sum::<Matrix3<f64>>() * (ENOUGH / normals.len() as f64);
+    let told: Option<Vec<Matrix3<f64>>> =
+        normals.iter().map(|normal| Some((normal + enough + hold).try_inverse()? * (normal + hold))).collect();
+    let told = told?;
+    let of_sum = told.iter().sum::<Matrix3<f64>>().try_inverse()?;
+    Some(told.iter().map(|told| of_sum * told).collect())
 }
 
 #[cfg(test)]
@@ -143,14 +151,13 @@ mod tests {
     /// The whole matrix with the condition's multipliers, dense.
     fn dense(normals: &[Matrix3<f64>], overlaps: &[RelativeCertainty]) -> DMatrix<f64> {
         let turns = 3 * normals.len();
-        let sum: Matrix3<f64> = normals.iter().map(|normal| normal + Matrix3::identity()).sum();
+        let shares = shares(normals).expect("held");
         let mut matrix = DMatrix::zeros(turns + 3, turns + 3);
         for (k, normal) in normals.iter().enumerate() {
             let mut block = matrix.fixed_view_mut::<3, 3>(3 * k, 3 * k);
             block += normal + Matrix3::identity();
-            let share = sum.try_inverse().expect("held") * (normal + Matrix3::identity());
-            matrix.fixed_view_mut::<3, 3>(3 * k, turns).copy_from(&share.transpose());
-            matrix.fixed_view_mut::<3, 3>(turns, 3 * k).copy_from(&share);
+            matrix.fixed_view_mut::<3, 3>(3 * k, turns).copy_from(&shares[k].transpose());
+            matrix.fixed_view_mut::<3, 3>(turns, 3 * k).copy_from(&shares[k]);
         }
         for one in overlaps {
             for (row, column, sign) in
@@ -185,9 +192,9 @@ mod tests {
             );
             let expected = &inverse * all;
             let turns = equations.solve(&right);
-            let weighed: Vector3<f64> = turns.iter().zip(&normals).map(|(turn, normal)| normal * turn + turn).sum();
-            let alone: f64 = turns.iter().zip(&normals).map(|(turn, normal)| (normal * turn + turn).norm()).sum();
-            assert!(weighed.norm() < 1e-9 * alone, "{weighed} of {alone}");
+            let shares = shares(&normals).expect("held");
+            let mean: Vector3<f64> = turns.iter().zip(&shares).map(|(turn, share)| share * turn).sum();
+            assert!(mean.norm() < 1e-10, "{mean}");
             for (k, (turn, covariance)) in turns.iter().zip(equations.covariances()).enumerate() {
                 let off = (turn - expected.fixed_rows::<3>(3 * k)).norm() / expected.norm();
                 assert!(off < 1e-8, "{k}: {off}");
@@ -195,6 +202,18 @@ mod tests {
                 let off = (covariance - expected).norm() / expected.norm();
                 assert!(off < 1e-7, "{k}: {off}");
             }
+        }
+    }
+
+    /// By hand: of 300, 100 and 0 the mean is 133.3, of which a twentieth is 6.67; with 1 to hold, 301 / 307.67 = 0.9783, 101 / 107.67 = 0.9381 and 1 / 7.67 = 0.1304
+    /// are divided by their sum, 2.0468.
+    #[test]
+    fn photographs_count_alike_from_a_twentieth_of_the_mean_on() {
+        let normals = [300.0, 100.0, 0.0].map(|told| Matrix3::from_diagonal(&Vector3::new(told, told, 0.0)));
+        let shares = shares(&normals).expect("determined");
+        for (share, expected) in shares.iter().zip([0.4780, 0.4583, 0.0637]) {
+            assert!((share[(0, 0)] - expected).abs() < 1e-4, "{share} instead of {expected}");
+            assert!((share[(2, 2)] - 1.0 / 3.0).abs() < 1e-12, "nothing is told about this axis");
         }
     }
 
@@ -207,7 +226,7 @@ mod tests {
         let overlap = |i, j| RelativeCertainty { i, j, information: Matrix3::identity() * 1e4 };
         let turns = TurnEquations::new(&normals, &[overlap(0, 1), overlap(1, 2)]).expect("determined").solve(&right);
         for (turn, expected) in turns.iter().zip([0.005, -0.005, -0.005]) {
-            assert!((turn.x - expected).abs() < 1e-5, "{turn} instead of {expected}");
+            assert!((turn.x - expected).abs() < 1e-4, "{turn} instead of {expected}");
         }
     }
 
