@@ -25,6 +25,9 @@ const SHARE_OF_SEVERAL: u64 = 2;
 /// Bytes that finding features takes per working pixel: the levels of the scale space of a photograph of twice the size.
 const FEATURE_BYTES: f64 = 240.0;
 
+/// Working pixels of a photograph that are counted at least, where as many are allowed: of small ones, what is taken beside their pixels is more than these.
+const LEAST_COUNTED: f64 = 480_000.0;
+
 /// Bytes of a pixel of a photograph that was reduced to its working size, with what its thumbnail takes.
 const REDUCED_BYTES: f64 = 4.5;
 
@@ -106,7 +109,8 @@ impl Budget {
             return Ok(Measuring { at_once: usize::MAX, kept_bytes: 0, held_features: 0 });
         };
         // Photographs are made smaller for measuring, never larger.
-        let working_pixels = working_pixels.min((bytes(largest) / PIXEL_BYTES) as f64);
+        let most_pixels = ((bytes(largest) / PIXEL_BYTES) as f64).max(LEAST_COUNTED);
+        let working_pixels = working_pixels.min(most_pixels);
         // One after the other: what is not kept of a photograph is let go before features are found in its working copy.
         let reduced = (REDUCED_BYTES * working_pixels) as usize;
         let features = ((FEATURE_BYTES * working_pixels) as usize).saturating_add(reduced);
@@ -227,12 +231,15 @@ mod tests {
         assert!(budget("200MB").measuring(&images(1, 3264, 2448), WORKING_PIXELS).is_err());
     }
 
-    /// Of 256 x 171 pixels, 43,776 are all there is to measure.
+    /// Of 1000 x 800 pixels, 800,000 are all there is to measure; of 256 x 171 half a million are counted.
     #[test]
     fn small_photographs_take_little_however_many_pixels_are_allowed() {
-        let measuring = |pixels: f64| budget("256MB").measuring(&images(5, 256, 171), pixels).expect("enough");
-        assert_eq!(measuring(1e8), measuring(43_776.0));
-        assert_eq!(measuring(1e8).at_once, 160_000_000 / 10_700_000);
+        let measuring = |size: [usize; 2], pixels: f64| {
+            budget("400MB").measuring(&images(5, size[0], size[1]), pixels).expect("enough")
+        };
+        assert_eq!(measuring([1000, 800], 1e8), measuring([1000, 800], 800_000.0));
+        assert_eq!(measuring([1000, 800], 1e8).at_once, 304_000_000 / 195_600_000);
+        assert_eq!(measuring([256, 171], 1e8), measuring([256, 171], LEAST_COUNTED));
     }
 
     #[test]
