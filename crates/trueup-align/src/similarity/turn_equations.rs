@@ -218,7 +218,7 @@ mod tests {
     }
 
     /// By hand: three photographs in a row, of which the first two show segments that ask for turns of 0.02 and 0.01; the mean of both is taken off, and the third
-    /// follows the second. With turns that sum to zero it would be turned by 0.01 to the other side.
+    /// follows the second. With turns that sum to zero the third would be turned by 0.03 to the other side.
     #[test]
     fn a_camera_without_segments_follows_those_that_it_overlaps() {
         let normals = [Matrix3::identity() * 1e8, Matrix3::identity() * 1e8, Matrix3::zeros()];
