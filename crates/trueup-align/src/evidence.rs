@@ -93,24 +93,35 @@ pub(crate) struct CommonSquare {
     pub(crate) mean: f64,
     /// The same less its standard error if they had nothing in common: what is sure.
     pub(crate) sure: f64,
+    /// The same with two standard errors more: what it hardly exceeds. Infinite where none has a neighbor.
+    pub(crate) at_most: f64,
 }
 
 impl CommonSquare {
     pub(crate) fn of(evidence: &[OverlapGap]) -> Self {
-        /// Pieces that are compared with one another; more hardly change the mean.
+        Self::of_overlaps(&[evidence])
+    }
+
+    /// Of several overlaps together; what lies in different ones is not near.
+    pub(crate) fn of_overlaps<E: AsRef<[OverlapGap]>>(overlaps: &[E]) -> Self {
+        /// Pieces of an overlap that are compared with one another; more hardly change the mean.
         const MOST: usize = 400;
-        let some: Vec<&OverlapGap> = evidence.iter().step_by(evidence.len().div_ceil(MOST).max(1)).collect();
         let (mut sum, mut squares) = (CommonSum::default(), 0.0);
-        for (k, one) in some.iter().enumerate() {
-            for other in &some[..k] {
-                if (NEAREST_PX..FARTHEST_PX).contains(&(other.place - one.place).norm()) {
-                    // Products with a member in common are uncorrelated all the same, so that their squares add up.
-                    squares += sum.add(one, other).powi(2);
+        for evidence in overlaps.iter().map(AsRef::as_ref) {
+            let some: Vec<&OverlapGap> = evidence.iter().step_by(evidence.len().div_ceil(MOST).max(1)).collect();
+            for (k, one) in some.iter().enumerate() {
+                for other in &some[..k] {
+                    if (NEAREST_PX..FARTHEST_PX).contains(&(other.place - one.place).norm()) {
+                        // Products with a member in common are uncorrelated all the same, so that their squares add up.
+                        squares += sum.add(one, other).powi(2);
+                    }
                 }
             }
         }
-        let sure = CommonSum { products: sum.products - squares.sqrt(), ..sum };
-        Self { mean: sum.mean_square(), sure: sure.mean_square() }
+        let error = squares.sqrt();
+        let moved = |by: f64| CommonSum { products: sum.products + by * error, ..sum }.mean_square();
+        let at_most = if sum.units > 0.0 { moved(2.0) } else { f64::INFINITY };
+        Self { mean: sum.mean_square(), sure: moved(-1.0), at_most }
     }
 }
 
@@ -203,9 +214,14 @@ mod tests {
         let common = CommonSquare::of(&square);
         assert!((common.sure - (6.0 - 6.0_f64.sqrt()) / 12.0).abs() < 1e-12);
         assert!((common.mean - 0.5).abs() < 1e-12);
+        assert!((common.at_most - (6.0 + 2.0 * 6.0_f64.sqrt()) / 12.0).abs() < 1e-12);
+        // Those of another overlap are no neighbors, wherever they lie.
+        let apart = CommonSquare::of_overlaps(&[&square[..1], &square[1..]]);
+        assert!((apart.at_most - (3.0 + 2.0 * 3.0_f64.sqrt()) / 6.0).abs() < 1e-12);
         // Too near to be told apart by their noise, or too far to be neighbors.
         assert_eq!(CommonSquare::of(&[one(0.0, 0.0), one(7.9, 0.0), one(90.0, 0.0)]).mean, 0.0);
-        assert_eq!(CommonSquare::of(&[]).mean, 0.0);
+        let none = CommonSquare::of(&[]);
+        assert_eq!((none.mean, none.at_most), (0.0, f64::INFINITY));
     }
 
     #[test]

@@ -72,7 +72,13 @@ impl LensSearch<'_> {
                 let asked = bent;
                 bent = self.bent(&mut parameters, group_of, &mut free, &asked)?;
                 if !bent.contains(&true) {
-                    return Ok(None);
+                    // A strong lens leaves too much to its first term alone.
+                    let mut explains =
+                        |terms| self.is_explained_by(terms, &asked, &mut parameters, group_of, &mut free);
+                    if !explains(terms)? && !explains(&[RADIAL, RADIAL + 1])? {
+                        return Ok(None);
+                    }
+                    bent.clone_from(&asked);
                 }
                 if self.add_settings(group_of, &asked, &bent, &mut free) {
                     let model = IntrinsicsModel::grouped(group_of, &free);
@@ -83,6 +89,7 @@ impl LensSearch<'_> {
             let ask = Ask { terms, of: &bent, huber_px: FINE_HUBER_PX };
             let believed = self.told(problem, &parameters, group_of, &free, &ask).by_either();
             if !believed.contains(&true) {
+                self.is_explained_by(terms, &bent, &mut parameters, group_of, &mut free)?;
                 continue;
             }
             set(&mut free, terms, &believed);
@@ -157,7 +164,7 @@ impl LensSearch<'_> {
 
     /// Whether k1, as it is in `parameters`, is worth a lens: of a pinhole the first look may show a bend that is gone when the
     /// cameras have settled.
-    fn is_visible(&self, parameters: &Parameters, group_of: &[usize], group: usize) -> bool {
+    pub(super) fn is_visible(&self, parameters: &Parameters, group_of: &[usize], group: usize) -> bool {
         group_of.iter().position(|&of| of == group).is_some_and(|member| {
             self.corner_shift(parameters, member, parameters.lenses[member].term(RADIAL)) > LEAST_SHIFT_PX
         })
@@ -258,7 +265,7 @@ struct Ask<'a> {
 }
 
 /// Frees `terms` of the groups for which it is `told`.
-fn set(free: &mut [FreeTerms], terms: &[usize], told: &[bool]) {
+pub(super) fn set(free: &mut [FreeTerms], terms: &[usize], told: &[bool]) {
     for (free, _) in free.iter_mut().zip(told).filter(|(_, told)| **told) {
         terms.iter().for_each(|&term| free[term] = true);
     }

@@ -5,7 +5,7 @@
 //! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
 //! bundle adjustment (`bundle`), from coarse to fine (`refinement`), photographs that differ with focal lengths of their own where a lens was zoomed (`zoom`).
 //! Terms of the lenses are added as long as the matches, and
-//! edges that are to be straight (`straightness`), are sure of them (`lenses`, `lens_evidence`): a pinhole stays one. Pairs that then contradict the others are set
+//! edges that are to be straight (`straightness`), are sure of them (`lenses`, `lens_evidence`; of few overlaps `lens_by_residual`): a pinhole stays one. Pairs that then contradict the others are set
 //! aside (`contradictions`). Focal lengths that parallax leaves open are those that are expected, in part (`expected_focal`), and those through which lines lie at right angles (`directions`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
 //! (`flat_scene`, by `plane_adjustment`), and lines say how it is turned (`upright_plane`).
 
@@ -18,6 +18,7 @@ mod flat_scene;
 mod focal;
 mod homography_focal;
 mod intrinsics;
+mod lens_by_residual;
 mod lens_evidence;
 mod lenses;
 mod levenberg_marquardt;

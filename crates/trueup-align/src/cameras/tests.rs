@@ -1,6 +1,6 @@
 //! Whole-stage tests on synthetic photographs with known cameras.
 
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use rand::RngExt;
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z, wrap_angle};
 use trueup_core::lens::{Lens, LensProjection, LensTerms};
@@ -16,7 +16,7 @@ use super::*;
 const WIDTH: f64 = 800.0;
 const HEIGHT: f64 = 600.0;
 
-fn frame() -> WorkingFrame {
+pub(super) fn frame() -> WorkingFrame {
     WorkingFrame { width: WIDTH, height: HEIGHT, working_from_full: 1.0 }
 }
 
@@ -216,12 +216,39 @@ fn a_bend_that_does_not_stay_is_no_lens() {
     assert!(found.is_none(), "{:?}", found.map(|found| found.parameters.lenses[0]));
 }
 
-/// A pair is no evidence: parallax bends it as a lens would.
+/// Two overlaps have no spread, but through the lens they leave nothing but noise. It moves the corners by 24 px.
 #[test]
-fn a_single_pair_tells_no_lens() {
-    let truth = bent(row(ROLLS)[..2].to_vec(), [-0.08, 0.0, 0.0, 0.0], [0.0; 2]);
-    let cameras = estimate(&matched(&truth, 0.3, 0.0), None, &[0; 2]);
-    assert!(cameras.cameras.iter().all(|camera| camera.lens.is_pinhole()));
+fn a_pair_and_a_triple_from_one_place_tell_their_lens() {
+    for count in [2, 3] {
+        let truth = bent(row(ROLLS)[..count].to_vec(), [-0.08, 0.0, 0.0, 0.0], [0.0; 2]);
+        let cameras = estimate(&matched(&truth, 0.3, 0.0), None, &vec![0; count]);
+        let found = &cameras.cameras[0];
+        assert!((found.lens.terms().radial[0] + 0.08).abs() < 0.004, "{found:?}");
+        assert!((found.focal_px / 650.0 - 1.0).abs() < 0.01, "{found:?}");
+    }
+}
+
+/// Parallax bends what a pair says as a lens would, but also otherwise: before a wall that recedes from 3 to 7 focal units, from places 0.2 apart.
+#[test]
+fn a_pair_from_two_places_tells_no_lens() {
+    let truth = row(ROLLS)[..2].to_vec();
+    let context = StageContext::default();
+    let mut generator = context.generator("parallax test", 0);
+    let mut noise = || 0.3 * ((0..12).map(|_| generator.random::<f64>()).sum::<f64>() - 6.0);
+    let mut inliers = Vec::new();
+    for k in 0..400 {
+        let (u, v) = ((f64::from(k) * 0.618_034).fract(), (f64::from(k) * 0.754_877).fract());
+        let source = Vector2::new(u * WIDTH, v * HEIGHT);
+        let point = truth[0].rotation().transpose() * truth[0].bearing(source) * (3.0 + 4.0 * u);
+        let seen = truth[1].project(truth[1].rotation() * (point - Vector3::new(0.2, 0.0, 0.0)));
+        let Some(target) = seen.filter(|target| frame().contains(target.x, target.y)) else { continue };
+        inliers.push(PointMatch {
+            in_a: [source.x + noise(), source.y + noise()],
+            in_b: [target.x + noise(), target.y + noise()],
+        });
+    }
+    let cameras = estimate(&[joined(0, 1, inliers)], None, &[0; 2]);
+    assert!(cameras.cameras.iter().all(|camera| camera.lens.is_pinhole()), "{:?}", cameras.cameras[0]);
 }
 
 /// 150 degrees across, nothing told.

@@ -1,0 +1,160 @@
+//! Lenses that few overlaps tell by what they leave: nothing but noise.
+//!
+//! Noise differs from match to match. Photographs from one place, through the right lens, leave nothing that neighboring matches err by alike. Parallax moves alike what is near together, and hardly ever
+//! as a lens does, so that some of that stays whichever lens is tried. Where this tells, the spread of the overlaps need not ([`super::lens_evidence`]), of which one or two have none.
+
+use nalgebra::{Matrix2, Vector2};
+use trueup_core::Result;
+use trueup_core::matches::PointMatch;
+use trueup_core::statistics::median;
+
+use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
+use super::intrinsics::{FreeTerms, IntrinsicsModel, RADIAL};
+use super::lenses::{LensSearch, set};
+use super::levenberg_marquardt::SETTLED;
+use super::observations::PairObservations;
+use super::transfer::CameraTransfer;
+use crate::evidence::{CommonSquare, OverlapGap};
+
+/// Most overlaps that are asked so. The spread of seven and more tells as well, in less time.
+const FEW_OVERLAPS: usize = 6;
+/// Share of the square of what neighboring matches err by alike that terms may leave to be believed for it. Measured on pairs and triples: 0.063 or less of 38 of some 60 cut
+/// through lenses (of the others the lens moves matches by hardly more than their noise), 0.05 or less of five photographed ones, whose lenses are those of the whole of their sets; 0.088 and more of some
+/// 160 photographed ones with parallax, and above 1 of pinholes.
+const MOST_LEFT: f64 = 1.0 / 16.0;
+/// The same of a first look at some of the matches, whose noise blurs it.
+const PROMISING: f64 = 0.25;
+/// When the cameras of that look are near enough: a step that saves less than this share of the cost is the last.
+const NEARLY_SETTLED: f64 = 1e-4;
+/// The terms that may be believed so. What is off center is too much like a turn.
+const RADIAL_TERMS: [usize; 2] = [RADIAL, RADIAL + 1];
+/// A match that is farther off than so many times the median counts as if it were so far off: false ones have large errors, which nothing explains.
+const FARTHEST_IN_MEDIANS: f64 = 4.0;
+
+impl LensSearch<'_> {
+    /// Whether radial `terms` of all groups `of` that are asked leave next to nothing that neighboring matches err by alike: then `parameters` are refined with
+    /// them, and `free` has them. Never of many overlaps, nor of terms that are free already.
+    pub(super) fn is_explained_by(
+        &self,
+        terms: &[usize],
+        of: &[bool],
+        parameters: &mut Parameters,
+        group_of: &[usize],
+        free: &mut [FreeTerms],
+    ) -> Result<bool> {
+        let mut wished = free.to_vec();
+        set(&mut wished, terms, of);
+        let is_asked = terms.iter().all(|term| RADIAL_TERMS.contains(term)) && wished != *free;
+        if !is_asked || self.problem.observations.pairs.len() > FEW_OVERLAPS {
+            return Ok(false);
+        }
+        let [without, with] = [&*free, &wished].map(|free| IntrinsicsModel::grouped(group_of, free));
+        let mut found = parameters.clone();
+        // Some of the matches show that most lenses are not worth a closer look.
+        for (problem, settled, most_left) in
+            [(self.problem, NEARLY_SETTLED, PROMISING), (self.precise, SETTLED, MOST_LEFT)]
+        {
+            let refined = |start: &Parameters, model: &IntrinsicsModel, huber_px: f64| {
+                problem.minimize_until(settled, start.clone(), model, huber_px, self.context)
+            };
+            let before = refined(parameters, &without, FINE_HUBER_PX)?;
+            found = refined(&refined(&found, &with, COARSE_HUBER_PX)?, &with, FINE_HUBER_PX)?;
+            let is_visible = (0..of.len()).any(|group| of[group] && self.is_visible(&found, group_of, group));
+            let is_explained = share_left(problem, &before, &found) <= most_left;
+            if !(is_visible && is_explained) {
+                return Ok(false);
+            }
+        }
+        free.clone_from_slice(&wished);
+        *parameters = found;
+        Ok(true)
+    }
+}
+
+/// Of what neighboring matches err by alike with the cameras `before`, the share (of its square) that is hardly exceeded with those `after`. Infinite where nothing was in
+/// common before.
+fn share_left(problem: &BundleAdjustment<'_>, before: &Parameters, after: &Parameters) -> f64 {
+    let (before, after) = (gaps(problem, before), gaps(problem, after));
+    let mut distances: Vec<f64> = after.iter().flatten().map(|one| one.gap.norm()).collect();
+    let Some(median) = median(&mut distances) else { return f64::INFINITY };
+    let common = |overlaps: &[Vec<OverlapGap>]| {
+        let limited: Vec<Vec<OverlapGap>> = overlaps
+            .iter()
+            .map(|gaps| gaps.iter().map(|one| limited(one, FARTHEST_IN_MEDIANS * median)).collect())
+            .collect();
+        CommonSquare::of_overlaps(&limited)
+    };
+    let (left, was) = (common(&after).at_most, common(&before).mean);
+    if was > 0.0 { left / was } else { f64::INFINITY }
+}
+
+/// The matches of every overlap as these cameras have them, where they see them.
+fn gaps(problem: &BundleAdjustment<'_>, parameters: &Parameters) -> Vec<Vec<OverlapGap>> {
+    let cameras = parameters.cameras(problem.priors);
+    let of_pair = |pair: &PairObservations| {
+        let transfer = CameraTransfer::Rotating(&cameras[pair.a], &cameras[pair.b]);
+        let gap = |one: &PointMatch| {
+            let place = Vector2::from(one.in_a);
+            let gap = Vector2::from(one.in_b) - transfer.at(place)?;
+            Some(OverlapGap { place, gap, known: Matrix2::identity() })
+        };
+        pair.matches.iter().filter_map(gap).collect()
+    };
+    problem.observations.pairs.iter().map(of_pair).collect()
+}
+
+fn limited(one: &OverlapGap, limit_px: f64) -> OverlapGap {
+    let excess = one.gap.norm() / limit_px;
+    if excess > 1.0 { OverlapGap { gap: one.gap / excess, ..*one } } else { *one }
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::lens::LensTerms;
+
+    use super::super::intrinsics::LensState;
+    use super::super::observations::Observations;
+    use super::super::prior::CameraPrior;
+    use super::super::straightness::CurveObservations;
+    use super::super::tests::{ROLLS, bent, frame, matched, row};
+    use super::*;
+
+    /// With the true cameras the noise of some 230 matches is left; seen from them, cameras without their lens have everything in common.
+    #[test]
+    fn the_right_cameras_leave_nothing_in_common() {
+        let radial = [-0.04, 0.0, 0.0, 0.0];
+        let truth = bent(row(ROLLS)[..2].to_vec(), radial, [0.0; 2]);
+        let pairs = matched(&truth, 0.3, 0.0);
+        let priors = [CameraPrior::unknown(frame(), 0), CameraPrior::unknown(frame(), 0)];
+        let observations = Observations::choose(&priors, &pairs.iter().collect::<Vec<_>>(), 1000);
+        let curves = CurveObservations::default();
+        let problem = BundleAdjustment {
+            priors: &priors,
+            observations: &observations,
+            curves: &curves,
+            start_focal_px: vec![650.0; 2],
+            reference: 0,
+            focal_sd: vec![1.0; 2],
+        };
+        let of = |terms: LensTerms| Parameters {
+            focal_px: vec![650.0; 2],
+            rotations: truth.iter().map(|camera| camera.rotation()).collect(),
+            lenses: vec![LensState { terms, ..LensState::default() }; 2],
+        };
+        let (right, wrong) = (of(LensTerms { radial, ..LensTerms::default() }), of(LensTerms::default()));
+        let left = share_left(&problem, &wrong, &right);
+        assert!((0.0..0.05).contains(&left), "{left}");
+        assert!(share_left(&problem, &right, &wrong) > 1.0);
+        // What is noise already is no better for a lens.
+        assert!(share_left(&problem, &right, &right) > 1.0);
+    }
+
+    #[test]
+    fn far_matches_count_as_if_they_were_nearer() {
+        let one = OverlapGap { place: Vector2::zeros(), gap: Vector2::new(3.0, -4.0), known: Matrix2::identity() };
+        assert_eq!(limited(&one, 2.5).gap, Vector2::new(1.5, -2.0));
+        assert_eq!(limited(&one, 5.5).gap, one.gap);
+        // Where most matches meet exactly.
+        assert_eq!(limited(&OverlapGap { gap: Vector2::zeros(), ..one }, 0.0).gap, Vector2::zeros());
+    }
+}
