@@ -18,9 +18,8 @@ use crate::evidence::{CommonSquare, OverlapGap};
 
 /// Most overlaps that are asked so. The spread of seven and more tells as well, in less time.
 const FEW_OVERLAPS: usize = 6;
-/// Share of the square of what neighboring matches err by alike that terms may leave to be believed for it. Measured on pairs and triples: 0.063 or less of 38 of some 60 cut
-/// through lenses (of the others the lens moves matches by hardly more than their noise), 0.05 or less of five photographed ones, whose lenses are those of the whole of their sets; 0.088 and more of some
-/// 160 photographed ones with parallax, and above 1 of pinholes.
+/// Share of the square of what neighboring matches err by alike that terms may leave to be believed for it. Measured on pairs and triples: less of two thirds of 83 cut through lenses (of most others the lens
+/// moves matches by hardly more than their noise) and of five photographed ones, whose lenses are those of the whole of their sets; 0.088 and more of some 160 photographed ones with parallax, above 1 of pinholes.
 const MOST_LEFT: f64 = 1.0 / 16.0;
 /// The same of a first look at some of the matches, whose noise blurs it.
 const PROMISING: f64 = 0.25;
