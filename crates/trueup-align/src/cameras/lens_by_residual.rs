@@ -83,7 +83,7 @@ fn share_left(problem: &BundleAdjustment<'_>, before: &Parameters, after: &Param
             .collect();
         CommonSquare::of_overlaps(&limited)
     };
-    let (left, was) = (common(&after).at_most, common(&before).mean);
+    let (left, was) = (common(&after).at_most(), common(&before).mean());
     if was > 0.0 { left / was } else { f64::INFINITY }
 }
 

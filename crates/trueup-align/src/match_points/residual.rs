@@ -87,8 +87,8 @@ impl<'a> CameraResidual<'a> {
         let [x, y] = cameras.to().principal_point;
         let margin = MAX_DEVIATION * 2.0 * x.hypot(y);
         let common = common_square(&samples);
-        let shrinkage = shrinkage(mean_square(&samples), common.mean);
-        Self { cameras, samples, common_square: common.sure, shrinkage, margin }
+        let shrinkage = shrinkage(mean_square(&samples), common.mean());
+        Self { cameras, samples, common_square: common.sure(), shrinkage, margin }
     }
 
     /// The place of `point` in the other photograph; `None` behind its camera or far outside.

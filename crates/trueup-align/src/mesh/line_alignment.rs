@@ -78,18 +78,23 @@ impl StraightInput<'_> {
 }
 
 /// How much of the distance at which matched points land in `grids` is common to neighbors: the mean over the points of
-/// the shares that they would have of their weights.
+/// the shares that they would have of their weights, and 0 where noise alone may have it. Shares are never negative, so that noise comes to some: to the more, the worse matches are found.
 pub(super) fn misaligned_share(points: &[PairMatches], grids: &CurrentGrids) -> f64 {
     /// Points of a pair that are asked; more hardly change the mean.
     const ASKED: usize = 400;
-    let shares = |pair: &PairMatches| {
+    let gaps = |pair: &PairMatches| -> Vec<OverlapGap> {
         let step = matched(pair).count().div_ceil(ASKED).max(1);
-        let gaps: Vec<OverlapGap> = matched(pair).step_by(step).map(|(_, ends)| point_gap(pair, ends, grids)).collect();
-        evidence::common_squares(&gaps).into_iter().map(|common| evidence::share(common, FULL_PX)).collect()
+        matched(pair).step_by(step).map(|(_, ends)| point_gap(pair, ends, grids)).collect()
     };
-    let shares: Vec<Vec<f64>> = points.par_iter().map(shares).collect();
-    let counted: usize = shares.iter().map(Vec::len).sum();
-    shares.into_iter().flatten().sum::<f64>() / counted.max(1) as f64
+    let gaps: Vec<Vec<OverlapGap>> = points.par_iter().map(gaps).collect();
+    if !evidence::is_beyond_noise(&gaps) {
+        return 0.0;
+    }
+    let share = |common: f64| evidence::share(common, FULL_PX);
+    let shares = |gaps: &Vec<OverlapGap>| evidence::common_squares(gaps).into_iter().map(share).sum::<f64>();
+    let shares: Vec<f64> = gaps.par_iter().map(shares).collect();
+    let counted: usize = gaps.iter().map(Vec::len).sum();
+    shares.into_iter().sum::<f64>() / counted.max(1) as f64
 }
 
 /// What a matched point of `pair` says; distances beyond the believed one count as that.

@@ -31,7 +31,7 @@ pub(crate) fn needs_pixels(options: &AlignOptions) -> bool {
 ///
 /// The note `parallax` says so where lines and pixels are taken.
 pub(super) fn asked_for(misaligned_share: f64, context: &StageContext) -> Evidence {
-    /// Photographs taken from one point come to less (65 of 66 sets with known cameras).
+    /// Photographs taken from one point come to less (65 of 66 sets with known cameras; of 191 with noise and blur drawn by lot 172).
     const WORTH_REFINING: f64 = 0.015;
     if misaligned_share < WORTH_REFINING {
         return Evidence::Points;
