@@ -125,7 +125,8 @@ impl<'a> PlainMesh<'a> {
     }
 
     /// How much of the distance at which matched `points` land is common to neighbors, and so is no noise but parallax
-    /// that a refinement could take up: the mean over the points of the share of its weight that each would have, 0 to 1.
+    /// that a refinement could take up: the mean over the points of the share of its weight that each would have, 0 to 1; 0 where noise
+    /// alone may have it.
     pub fn misaligned_share(&self, points: &[PairMatches]) -> f64 {
         let (solved, fine, places) = (&self.solved.meshes, &self.warped.meshes, &self.layout.places);
         line_alignment::misaligned_share(points, &CurrentGrids { solved, fine, places })
