@@ -49,20 +49,10 @@ pub(crate) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
     let around: Vec<CommonSum> = evidence
         .par_iter()
         .map(|one| {
-            let mut near: Vec<(f64, &OverlapGap)> = evidence
-                .iter()
-                .map(|other| ((other.place - one.place).norm_squared(), other))
-                .filter(|(square, _)| *square <= FARTHEST_PX.powi(2))
-                .collect();
-            if near.len() > NEIGHBORS {
-                near.select_nth_unstable_by(NEIGHBORS - 1, |one, other| one.0.total_cmp(&other.0));
-                near.truncate(NEIGHBORS);
-            }
-            // The selection leaves no order, and sums depend on theirs.
-            near.sort_by(|one, other| one.0.total_cmp(&other.0));
+            let near = nearest(evidence, one, 0.0, NEIGHBORS);
             let mut sum = CommonSum::default();
-            for (k, (_, one)) in near.iter().enumerate() {
-                for (_, other) in &near[..k] {
+            for (k, one) in near.iter().enumerate() {
+                for other in &near[..k] {
                     if (other.place - one.place).norm_squared() >= NEAREST_PX.powi(2) {
                         sum.add(one, other);
                     }
@@ -86,6 +76,22 @@ pub(crate) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
         .collect()
 }
 
+/// The nearest to one piece of evidence, at most so many, which lie `from_px` to [`FARTHEST_PX`] from it; in the order of their distance, on which sums depend.
+fn nearest<'a>(evidence: &'a [OverlapGap], one: &OverlapGap, from_px: f64, most: usize) -> Vec<&'a OverlapGap> {
+    let near = from_px.powi(2)..FARTHEST_PX.powi(2);
+    let mut found: Vec<(f64, &OverlapGap)> = evidence
+        .iter()
+        .map(|other| ((other.place - one.place).norm_squared(), other))
+        .filter(|(square, _)| near.contains(square))
+        .collect();
+    if found.len() > most {
+        found.select_nth_unstable_by(most - 1, |one, other| one.0.total_cmp(&other.0));
+        found.truncate(most);
+    }
+    found.sort_by(|one, other| one.0.total_cmp(&other.0));
+    found.into_iter().map(|(_, other)| other).collect()
+}
+
 /// Whether neighbors have more in common than noise would: the nearest of each alone, since what parallax leaves of overlaps that were drawn together changes its sign over a few cells.
 pub(crate) fn is_beyond_noise(overlaps: &[Vec<OverlapGap>]) -> bool {
     /// Neighbors that are asked of each. Measured on 61 photographed sets, 108 pairs and triples out of them and 191 cut sets from one place: eight or twelve tell these apart as well, two worse.
@@ -93,14 +99,7 @@ pub(crate) fn is_beyond_noise(overlaps: &[Vec<OverlapGap>]) -> bool {
     /// Standard errors that noise seldom comes to: of these 191 sets, of 50 whose shares alone say that parallax keeps them apart, 19 do, and 116 of 121 photographed ones.
     const NOISE: f64 = 1.5;
     let of_one = |evidence: &[OverlapGap], one: &OverlapGap| {
-        let mut near: Vec<(f64, &OverlapGap)> = evidence
-            .iter()
-            .map(|other| ((other.place - one.place).norm_squared(), other))
-            .filter(|(square, _)| (NEAREST_PX.powi(2)..FARTHEST_PX.powi(2)).contains(square))
-            .collect();
-        near.sort_by(|one, other| one.0.total_cmp(&other.0));
-        near.truncate(NEIGHBORS);
-        near.iter().fold([0.0; 2], |[sum, squares], (_, other)| {
+        nearest(evidence, one, NEAREST_PX, NEIGHBORS).iter().fold([0.0; 2], |[sum, squares], other| {
             let product = one.gap.dot(&other.gap);
             [sum + product, squares + product * product]
         })

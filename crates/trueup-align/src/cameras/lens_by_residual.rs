@@ -26,7 +26,7 @@ const PROMISING: f64 = 0.25;
 /// When the cameras of that look are near enough: a step that saves less than this share of the cost is the last.
 const NEARLY_SETTLED: f64 = 1e-4;
 /// The terms that may be believed so. What is off center is too much like a turn.
-const RADIAL_TERMS: [usize; 2] = [RADIAL, RADIAL + 1];
+pub(super) const RADIAL_TERMS: [usize; 2] = [RADIAL, RADIAL + 1];
 /// A match that is farther off than so many times the median counts as if it were so far off: false ones have large errors, which nothing explains.
 const FARTHEST_IN_MEDIANS: f64 = 4.0;
 

@@ -4,6 +4,7 @@ use trueup_core::{Result, StageContext};
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
 use super::intrinsics::{CENTER, FOCAL, FreeTerms, IntrinsicsModel, RADIAL, TANGENTIAL, ZOOM_SPREAD, only_focal};
+use super::lens_by_residual::RADIAL_TERMS;
 use super::lens_evidence::{LensEvidence, Witness};
 use super::options::LensKind;
 use super::prior::CameraPrior;
@@ -75,7 +76,7 @@ impl LensSearch<'_> {
                     // A strong lens leaves too much to its first term alone.
                     let mut explains =
                         |terms| self.is_explained_by(terms, &asked, &mut parameters, group_of, &mut free);
-                    if !explains(terms)? && !explains(&[RADIAL, RADIAL + 1])? {
+                    if !explains(terms)? && !explains(&RADIAL_TERMS)? {
                         return Ok(None);
                     }
                     bent.clone_from(&asked);

@@ -40,13 +40,42 @@ pub(super) struct CameraAngle {
 
 impl CameraAngle {
     /// Whether it is farther than the cameras allow: where their rolls contradict each other, as with one photograph on its corner, they
-    /// know little; and so do two that may look up or down alike, if lines `agree_closely`.
-    pub(super) fn is_too_wide(self, agree_closely: bool) -> bool {
+    /// know little; so do two that may look up or down alike, if lines agree closely; and however many, which may all be held rolled alike, where
+    /// more agree closely than do by chance.
+    pub(super) fn is_too_wide(self, agreement: Agreement) -> bool {
         // Not-a-number is too wide.
         let is_near = self.angle.to_degrees() <= MAX_CAMERA_ANGLE_DEG || self.deviations <= MAX_CAMERA_DEVIATIONS;
         let held_level = self.rolls.is_some_and(|rolls| rolls.to_degrees() <= MAX_CAMERA_ANGLE_DEG);
-        let is_steep = held_level && self.angle.to_degrees() <= MAX_STEEP_DEG;
-        !(is_near || is_steep && agree_closely)
+        let is_within = self.angle.to_degrees() <= MAX_STEEP_DEG;
+        let is_explained = match agreement {
+            Agreement::Loose => false,
+            Agreement::Close => held_level,
+            Agreement::CloseOfMany => true,
+        };
+        !(is_near || is_within && is_explained)
+    }
+}
+
+/// How the directions of photographs agree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Agreement {
+    /// No closer than a divergence that the gate allows anywhere.
+    Loose,
+    /// As closely as directions far from the cameras' level must.
+    Close,
+    /// As closely, and of more than [`VERY_FEW_PHOTOGRAPHS`].
+    CloseOfMany,
+}
+
+impl Agreement {
+    /// Of `inliers` photographs with this divergence.
+    pub(super) fn of(inliers: usize, divergence: f64, options: &SimilarityOptions) -> Self {
+        let is_close = divergence <= STEEP_DIVERGENCE_SHARE * options.max_divergence_few;
+        match (is_close, inliers > VERY_FEW_PHOTOGRAPHS) {
+            (false, _) => Self::Loose,
+            (true, false) => Self::Close,
+            (true, true) => Self::CloseOfMany,
+        }
     }
 }
 
@@ -189,8 +218,8 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
             ));
         }
     }
-    let agree_closely = divergence <= STEEP_DIVERGENCE_SHARE * options.max_divergence_few;
-    if let Some(wide) = from_cameras.filter(|found| found.is_too_wide(agree_closely)) {
+    let agreement = Agreement::of(inliers, divergence, options);
+    if let Some(wide) = from_cameras.filter(|found| found.is_too_wide(agreement)) {
         let (angle, allowed) = told_apart(wide.angle.to_degrees(), MAX_CAMERA_ANGLE_DEG, 1);
         return Some(format!(
             "the dominant vertical is {angle} degrees from the vertical of the cameras ({allowed} allowed)"
@@ -218,12 +247,12 @@ mod tests {
 
     #[test]
     fn photographs_that_look_up_alike_may_be_far_from_level() {
-        let refused = |divergence: f64, angle_deg: f64, rolls_deg: Option<f64>| {
+        let refused_of = |photographs: usize, divergence: f64, angle_deg: f64, rolls_deg: Option<f64>| {
             let rolls = rolls_deg.map(f64::to_radians);
             let from_cameras = Some(CameraAngle { angle: angle_deg.to_radians(), deviations: 6.0, rolls });
             let evidence = GateEvidence {
-                photographs: 2,
-                inliers: 2,
+                photographs,
+                inliers: photographs,
                 divergence,
                 from_cameras,
                 significance: Some(6.0),
@@ -233,12 +262,16 @@ mod tests {
             };
             failed_clause(&evidence, &SimilarityOptions::default()).is_some()
         };
+        let refused = |divergence, angle_deg, rolls_deg| refused_of(2, divergence, angle_deg, rolls_deg);
         assert!(!refused(0.0115, 30.0, Some(4.0)));
         assert!(refused(0.0117, 30.0, Some(4.0)), "more directions lie there, and have to agree more closely");
         assert!(refused(0.001, 37.0, Some(4.0)), "what lies level in front is as near");
         assert!(refused(0.001, 30.0, Some(21.0)), "the photographs would be rolled");
         assert!(refused(0.001, 30.0, None), "the cameras tell");
         assert!(!refused(0.019, 19.0, None));
+        assert!(refused_of(3, 0.0115, 30.0, None), "three meet by chance");
+        assert!(!refused_of(4, 0.0115, 30.0, None), "four were all held rolled");
+        assert!(refused_of(4, 0.0117, 30.0, None) && refused_of(4, 0.001, 37.0, None));
     }
 
     /// 5 + (5 / 2.5)^2 / 2 / 2 = 6 standard deviations for rolls of 5 degrees, and never more than 7; 0.02 exp(2 (6.6 - 6) / 1.5) = 0.0445.

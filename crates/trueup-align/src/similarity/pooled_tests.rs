@@ -1,12 +1,14 @@
 //! Tests of what the segments of all photographs say together.
 
+use nalgebra::Vector3;
 use trueup_core::StageContext;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::{rotation_about_x, rotation_about_z};
 
-use super::synthetic::{Sweep, SyntheticScene, World, photograph_lines};
+use super::synthetic::{Sweep, SyntheticScene, World, found, noise_rotation, photograph_lines};
 use super::tests::{missing, with_lines};
-use super::{LevelSource, SimilarityOptions};
+use super::vertical::roll_of;
+use super::{Guidance, LevelSource, SimilarityOptions};
 use crate::vanishing::InterpretationPlanes;
 use crate::vanishing::frame_search::GUIDING_SIGNIFICANCE;
 use crate::vanishing::jackknife::{self, covariance_by_photographs};
@@ -113,6 +115,39 @@ fn a_frame_does_not_guide_where_photographs_agree_on_a_better_one_out_of_reach()
     scene.triads = vec![missing(); scene.triads.len()];
     let guidance = scene.prior(&SimilarityOptions::default()).guidance;
     assert!(guidance.used && guidance.pooled, "{:?}", guidance.failed_clause);
+}
+
+/// Photographs of a Manhattan world, all of them held rolled by as much, so that their row runs askew through it. Returns the guidance and the largest error of the rolls, degrees.
+fn held_rolled(count: usize, rolled_deg: f64, noise_deg: f64) -> (Guidance, f64) {
+    let sweep = Sweep { count, roll_sd_deg: 1.0, ..Sweep::default() };
+    let mut scene = SyntheticScene::new(sweep, World::Random, 0.0, 3);
+    let world = rotation_about_z(rolled_deg.to_radians());
+    let mut generator = StageContext::default().generator("held rolled", 0);
+    for k in 0..count {
+        let camera_from_world = scene.world_from_camera[k].transpose() * world;
+        scene.triads[k] = found(&(noise_rotation(noise_deg, &mut generator) * camera_from_world));
+        scene.lines[k] = photograph_lines(&camera_from_world, 20, 20, 0.5, &mut generator);
+        scene.roll[k] = roll_of(&(camera_from_world * Vector3::y())).expect("no photograph looks straight up");
+    }
+    let prior = scene.prior(&SimilarityOptions { vertical_only: false, ..SimilarityOptions::default() });
+    let worst = max(&scene.errors_deg(&prior));
+    (prior.guidance, worst)
+}
+
+/// A row of photographs that were all rolled alike looks level to the cameras. Four that agree closely are believed, three are not, nor are five that only
+/// agree as far as the gate allows near the cameras' level, nor what is as near to a level direction.
+#[test]
+fn four_photographs_that_agree_closely_stand_upright_however_they_were_held() {
+    for rolled_deg in [22.0, 30.0, 34.0] {
+        let (guidance, worst_deg) = held_rolled(4, rolled_deg, 0.3);
+        assert!(guidance.used && !guidance.pooled, "{rolled_deg}: {:?}", guidance.failed_clause);
+        assert!(worst_deg < 0.5, "{rolled_deg}: {worst_deg}");
+    }
+    for (count, rolled_deg, noise_deg) in [(3, 30.0, 0.3), (5, 30.0, 4.0), (5, 40.0, 0.3)] {
+        let (guidance, _) = held_rolled(count, rolled_deg, noise_deg);
+        let refused = guidance.failed_clause.is_some_and(|clause| clause.contains("from the vertical of the cameras"));
+        assert!(refused && !guidance.used, "{count} {rolled_deg} {noise_deg}: {:?}", guidance.divergence);
+    }
 }
 
 /// Three upright lines in each of five photographs among forty that lie anyhow do not guide; the panorama leans by a third less all the same, in the mean

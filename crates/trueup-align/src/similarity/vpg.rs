@@ -7,7 +7,7 @@ use trueup_core::{Result, StageContext};
 
 use super::camera_correction::{corrected_rotations, relative_certainties};
 use super::dominant::{Dominant, dominant_frame};
-use super::gate::{GateEvidence, allowed_divergence, allowed_of_level_lines, divergence, failed_clause};
+use super::gate::{Agreement, GateEvidence, allowed_divergence, allowed_of_level_lines, divergence, failed_clause};
 use super::held::held_roll;
 use super::input::PriorInput;
 use super::level::{CameraLevel, LevelSource};
@@ -150,16 +150,28 @@ impl<'a> SceneDirections<'a> {
     }
 
     /// About which vertical frames are sought of all lines together: the cameras', unless the vertical of `dominant` is out of reach from there and
-    /// the cameras know so little that it may be theirs, as of two photographs of which one lies on its side.
+    /// the cameras know so little that it may be theirs, as of two photographs of which one lies on its side, or more than very few agree closely.
     fn searched_about(&self, dominant: &Dominant) -> Vector3<f64> {
         let own = self.vertical(&dominant.frame);
-        let is_theirs = self.level.angle_to(&own).is_some_and(|found| !found.is_too_wide(false));
+        let agreement = match self.agreement(dominant) {
+            Agreement::Close => Agreement::Loose,
+            other => other,
+        };
+        let is_theirs = self.level.angle_to(&own).is_some_and(|found| !found.is_too_wide(agreement));
         if self.is_out_of_reach(&own) && is_theirs { own } else { self.level.down }
     }
 
     /// Whether a search of all lines together about the cameras' vertical cannot find this one.
     fn is_out_of_reach(&self, vertical: &Vector3<f64>) -> bool {
         vertical.angle(&self.level.down) > SEARCH_DEG.to_radians()
+    }
+
+    /// How the photographs' directions agree on `dominant`.
+    fn agreement(&self, dominant: &Dominant) -> Agreement {
+        let inliers = self.inliers(dominant);
+        let residuals: Vec<f64> = inliers.iter().filter_map(|&index| dominant.residuals[index]).collect();
+        let divergence = divergence(&residuals, self.level.rotations.len(), self.options.as_printed.divergence);
+        Agreement::of(inliers.len(), divergence, self.options)
     }
 
     /// Photographs whose directions agree with `dominant`.
@@ -226,7 +238,7 @@ impl<'a> SceneDirections<'a> {
         let frame = pooled.refined(&self.vote)?;
         let down = self.vertical(&frame);
         // What stands out so far is agreed on.
-        if self.level.angle_to(&down).is_some_and(|found| found.is_too_wide(true)) {
+        if self.level.angle_to(&down).is_some_and(|found| found.is_too_wide(Agreement::Close)) {
             return None;
         }
         let allowed = allowed_of_level_lines(pooled.significance - GUIDING_SIGNIFICANCE);
