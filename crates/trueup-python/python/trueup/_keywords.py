@@ -93,9 +93,9 @@ class StitchKeywords(ComposeKeywords, total=False):
     specification; the matches may still change the focal length by up to 5 %. Say it where photographs carry no focal
     length, or a wrong one; 0 leaves it to them (default 0.0)."""
     stacks: Literal["auto", "light", "none"]
-    """Which photographs are fused before they are stitched: consecutive ones that show one view at several exposures (a
-    bracket). Choose light for the light of all exposures in a panorama that is not written with floating point samples,
-    or not yet. Choose none to have each of them stitched as it is (default auto)."""
+    """Which photographs are fused before they are stitched: those that show one view at several exposures (a bracket),
+    one after the other or pass by pass. Choose light for the light of all exposures in a panorama that is not written
+    with floating point samples, or not yet. Choose none to have each of them stitched as it is (default auto)."""
     method: Literal[
         "vpg",
         "gsp-2d",
@@ -156,9 +156,9 @@ class BatchKeywords(SaveKeywords, total=False):
     specification; the matches may still change the focal length by up to 5 %. Say it where photographs carry no focal
     length, or a wrong one; 0 leaves it to them (default 0.0)."""
     stacks: Literal["auto", "light", "none"]
-    """Which photographs are fused before they are stitched: consecutive ones that show one view at several exposures (a
-    bracket). Choose light for the light of all exposures in a panorama that is not written with floating point samples,
-    or not yet. Choose none to have each of them stitched as it is (default auto)."""
+    """Which photographs are fused before they are stitched: those that show one view at several exposures (a bracket),
+    one after the other or pass by pass. Choose light for the light of all exposures in a panorama that is not written
+    with floating point samples, or not yet. Choose none to have each of them stitched as it is (default auto)."""
     scale: float
     """Size of the panorama relative to the reference photograph's own pixels: 1 keeps every detail the reference has.
     Lower it for a quick preview (0.25) or a smaller file; raise it only if the reference was taken with a shorter lens

@@ -106,15 +106,21 @@ pub fn align(pair: &MemberPair) -> Result<AlignedMember, Unaligned> {
         guess,
         deviation,
     };
+    let size = [reference.width(), reference.height()];
+    let is_near = |moved: f64| moved <= 2.0 * MOST_SHIFT * longer;
     for (level, (dark, bright)) in sizes.iter().enumerate().rev() {
+        let before = turn;
         turn.refine(dark, bright, 0.5_f64.powi(level as i32));
+        // Where hardly anything is not white, small pictures may lead astray; larger ones tell more from where these began.
+        if !is_near(turn.farthest_px(size)) {
+            turn = before;
+        }
     }
-    let bright_from_dark = turn.bright_from_dark([reference.width(), reference.height()], 1.0);
-    let corners = corners([reference.width(), reference.height()]);
-    let moved = corners.map(|corner| (bright_from_dark.apply(corner) - corner).norm()).into_iter().fold(0.0, larger);
-    if moved.is_nan() || moved > 2.0 * MOST_SHIFT * longer {
+    let moved = turn.farthest_px(size);
+    if !is_near(moved) {
         return Err(Unaligned::TooFar(moved / longer));
     }
+    let bright_from_dark = turn.bright_from_dark(size, 1.0);
     let checked = usize::from(sizes.len() > 1);
     let (dark, bright) = &sizes[checked];
     let scale = 0.5_f64.powi(checked as i32);
@@ -171,6 +177,13 @@ impl Turn {
         let (x, y) = (width as f64 / 2.0, height as f64 / 2.0);
         let inverse = Matrix3::new(1.0 / focal, 0.0, -x / focal, 0.0, 1.0 / focal, -y / focal, 0.0, 0.0, 1.0);
         Homography(camera * self.rotation.matrix() * inverse)
+    }
+
+    /// How far it moves the corner of a full picture that it moves farthest, in pixels.
+    fn farthest_px(&self, size: [usize; 2]) -> f64 {
+        let bright_from_dark = self.bright_from_dark(size, 1.0);
+        let moved = corners(size).map(|corner| (bright_from_dark.apply(corner) - corner).norm());
+        moved.into_iter().fold(0.0, larger)
     }
 
     /// `bright` as the dark camera would have seen it; NaN outside.

@@ -22,6 +22,7 @@
 mod alignment;
 mod likeness;
 mod limits;
+mod passes;
 mod same_view;
 #[cfg(test)]
 mod tests;
@@ -36,6 +37,7 @@ pub use alignment::{AlignedMember, MemberPair, Unaligned, align};
 use likeness::{CLIPPED, CRUSHED, gray};
 pub use limits::LEAST_STOPS;
 use limits::{LEAST_RANGE, LEAST_STEP, MOST_SHIFT, ONE_EXPOSURE, SAME_RECORD};
+use passes::ShotOrder;
 use same_view::{SameView, SmallCopy, same_view};
 
 /// A photograph is compared with so many that follow it: cameras take the darkest and the brightest of a bracket one after the other, which
@@ -46,10 +48,15 @@ const LOOK_AHEAD: usize = 3;
 /// of them in memory, and takes as much longer as there are more.
 const MOST_MEMBERS: usize = 16;
 
+/// Share of the views that must be stacks for photographs to have been taken in passes: of some, the sky is all that they show, and no details tell of it.
+const LEAST_STACKED: f64 = 0.6;
+/// Views, the first ones, that tell whether the others are worth a look.
+const PROBED_VIEWS: usize = 3;
+
 trueup_core::choice! {
     /// Which photographs are fused.
     pub enum Fuse {
-        /// Consecutive photographs of one view at several exposures become one photograph: their light where the panorama is written with
+        /// Photographs of one view at several exposures, which follow one another or come again with every pass over all views, become one photograph: their light where the panorama is written with
         /// floating point samples, else a picture.
         Auto = "auto",
         /// The same, always their light: for panoramas of which it is not known how they will be written.
@@ -62,7 +69,7 @@ trueup_core::choice! {
 trueup_core::options! {
     /// What becomes of photographs of one view at several exposures.
     pub struct StackOptions("stacks") {
-        /// Which photographs are fused before they are stitched: consecutive ones that show one view at several exposures (a bracket).
+        /// Which photographs are fused before they are stitched: those that show one view at several exposures (a bracket), one after the other or pass by pass.
         /// Choose light for the light of all exposures in a panorama that is not written with floating point samples, or not yet.
         /// Choose none to have each of them stitched as it is.
         fuse: Fuse = Fuse::Auto, Allowed::Any, "", basic;
@@ -104,26 +111,85 @@ pub struct FoundMember {
     pub is_sure: bool,
 }
 
-/// The stacks among `candidates`, in their order: runs of consecutive photographs by one camera that show the same view at exposures of
-/// which no two are alike.
+/// The stacks among `candidates`, in the order of their references: runs of consecutive photographs by one camera that show the same view at exposures of
+/// which no two are alike; or, where few are of such, the same of one after the other pass over all views, each at an exposure of its own.
 pub fn find(candidates: &[StackCandidate]) -> Vec<FoundStack> {
     let copies: Vec<Option<SmallCopy>> =
         candidates.par_iter().map(|candidate| SmallCopy::new(candidate.thumbnail?)).collect();
-    let size = |number: usize| candidates[number].thumbnail.map(|one| (one.width(), one.height()));
-    let compared = |a: usize| {
-        let following = a + 1..(a + 1 + LOOK_AHEAD).min(candidates.len());
-        let with = |b: usize| {
-            let alike = candidates[a].camera == candidates[b].camera && size(a) == size(b);
-            let recorded = [a, b].map(|one| candidates[one].recorded_stops);
-            let recorded = recorded[1].zip(recorded[0]).map(|(of_b, of_a)| of_b - of_a);
-            let found = if alike { same_view(copies[a].as_ref()?, copies[b].as_ref()?, recorded) } else { None };
-            Some(((a, b), found?))
+    let photographs = Photographs { candidates, copies: &copies };
+    let consecutive = photographs.stacks_in(&passes::one_by_one(candidates.len()));
+    let of_stacks = |stacks: &[FoundStack]| -> usize { stacks.iter().map(FoundStack::photographs).sum() };
+    // Where a pass ends and the next one goes back, two exposures of one view are consecutive as well.
+    if 2 * of_stacks(&consecutive) >= candidates.len() {
+        return consecutive;
+    }
+    let in_passes = passes::orders(candidates.len()).find_map(|order| photographs.taken_in(&order));
+    in_passes.filter(|found| of_stacks(found) > of_stacks(&consecutive)).unwrap_or(consecutive)
+}
+
+/// The candidates, with what of each is compared.
+struct Photographs<'a> {
+    candidates: &'a [StackCandidate<'a>],
+    copies: &'a [Option<SmallCopy>],
+}
+
+impl Photographs<'_> {
+    /// The stacks of photographs that were taken in passes, unless too few views are stacks for that.
+    fn taken_in(&self, order: &ShotOrder) -> Option<Vec<FoundStack>> {
+        // What is no order of these photographs shows at once.
+        let first = order.first_views(PROBED_VIEWS);
+        let is_likely =
+            |order: &ShotOrder, found: &[FoundStack]| found.len() as f64 >= LEAST_STACKED * order.views() as f64;
+        let probed = self.stacks_in(&first);
+        if !is_likely(&first, &probed) {
+            return None;
+        }
+        Some(self.stacks_in(order)).filter(|found| is_likely(order, found))
+    }
+
+    /// The stacks of photographs that may be of one view where they follow one another in `order`, within what it has of one view.
+    fn stacks_in(&self, order: &ShotOrder) -> Vec<FoundStack> {
+        let ShotOrder { numbers, of_view } = order;
+        let ordered: Vec<StackCandidate> = numbers.iter().map(|&number| self.candidates[number]).collect();
+        let size = |place: usize| ordered[place].thumbnail.map(|one| (one.width(), one.height()));
+        let compared = |a: usize| {
+            let end_of_view = (a / of_view + 1) * of_view;
+            let following = a + 1..(a + 1 + LOOK_AHEAD).min(end_of_view).min(ordered.len());
+            let with = |b: usize| {
+                let alike = ordered[a].camera == ordered[b].camera && size(a) == size(b);
+                let recorded = [a, b].map(|one| ordered[one].recorded_stops);
+                let recorded = recorded[1].zip(recorded[0]).map(|(of_b, of_a)| of_b - of_a);
+                let [one, other] = [a, b].map(|place| self.copies[numbers[place]].as_ref());
+                let found = if alike { same_view(one?, other?, recorded) } else { None };
+                Some(((a, b), found?))
+            };
+            following.filter_map(with).collect::<Vec<_>>()
         };
-        following.filter_map(with).collect::<Vec<_>>()
-    };
-    let same: BTreeMap<(usize, usize), SameView> =
-        (0..candidates.len()).into_par_iter().flat_map_iter(compared).collect::<Vec<_>>().into_iter().collect();
-    runs(candidates.len(), &same).into_iter().flat_map(|run| stacks_of(&run, &same, candidates)).collect()
+        let same: BTreeMap<(usize, usize), SameView> =
+            (0..ordered.len()).into_par_iter().flat_map_iter(compared).collect::<Vec<_>>().into_iter().collect();
+        let runs = runs(ordered.len(), &same);
+        let stacks = runs.into_iter().flat_map(|run| stacks_of(&run, &same, &ordered));
+        let mut stacks: Vec<FoundStack> = stacks.map(|stack| stack.numbered(numbers)).collect();
+        stacks.sort_by_key(|stack| stack.reference);
+        stacks
+    }
+}
+
+impl FoundStack {
+    /// How many photographs it has.
+    fn photographs(&self) -> usize {
+        1 + self.others.len() + self.spare.len()
+    }
+
+    /// The same with the numbers of photographs that are at the places it has.
+    fn numbered(mut self, numbers: &[usize]) -> Self {
+        self.reference = numbers[self.reference];
+        for members in [&mut self.others, &mut self.spare] {
+            members.iter_mut().for_each(|member| member.photograph = numbers[member.photograph]);
+            members.sort_by_key(|member| member.photograph);
+        }
+        self
+    }
 }
 
 /// Consecutive photographs that are joined, directly or by others of the run, with where they stand beside the first of them.

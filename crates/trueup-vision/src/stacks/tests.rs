@@ -116,6 +116,37 @@ fn a_view_that_comes_back_after_another_is_no_stack_and_the_next_one_is() {
     assert!(matches!(numbers[..], [(2, 3) | (3, 2)]), "{numbers:?}");
 }
 
+/// A turn that was photographed dark, then light, then between, with the same rests each time, there or there and back; and the same from other places each time,
+/// at one exposure, and with a view in two that does not come again.
+#[test]
+fn exposures_of_one_pass_after_the_other_are_stacks() {
+    let exposures = [0.2, 5.0, 1.0];
+    let view = |pass: usize, view: usize| {
+        let [x, y, z] = HAND[pass];
+        [x, y + DIRECTIONS[view], z]
+    };
+    let shots = |and_back: bool, off: f64, exposures: [f64; 3]| -> Vec<([f64; 3], f64)> {
+        let of_pass = |pass: usize| {
+            let views: Vec<usize> = if and_back && pass == 1 { vec![2, 1, 0] } else { vec![0, 1, 2] };
+            views.into_iter().map(move |one| {
+                let [x, y, z] = view(pass, one);
+                ([x, y + off * pass as f64, z], exposures[pass])
+            })
+        };
+        (0..3).flat_map(of_pass).collect()
+    };
+    let same = numbers(&found(&shots(false, 0.0, exposures)));
+    assert_eq!(same, [[0, 3, 6], [1, 4, 7], [2, 5, 8]].map(|stack| (stack.to_vec(), Vec::new())));
+    let back = numbers(&found(&shots(true, 0.0, exposures)));
+    assert_eq!(back, [[0, 5, 6], [1, 4, 7], [2, 3, 8]].map(|stack| (stack.to_vec(), Vec::new())));
+    assert!(found(&shots(false, 0.15, exposures)).is_empty(), "neighbors in a row");
+    assert!(found(&shots(false, 0.0, [1.0; 3])).is_empty(), "one exposure");
+    let mut half = vec![(view(0, 0), 1.0), (view(0, 1), 1.0), (view(1, 0), 4.0), (view(1, 2), 4.0)];
+    assert!(found(&half).is_empty(), "one view of two");
+    half[3] = (view(1, 1), 4.0);
+    assert_eq!(found(&half).len(), 2);
+}
+
 /// The numbers of each stack's photographs, in their order, and of what it can spare.
 fn numbers(stacks: &[FoundStack]) -> Vec<(Vec<usize>, Vec<usize>)> {
     let sorted = |stack: &FoundStack| {
@@ -269,4 +300,29 @@ fn what_shows_something_else_is_not_aligned() {
     assert!(matches!(align(&pair), Err(Unaligned::OtherDetails(_) | Unaligned::TooFar(_))));
     let small = taken([20, 20], 20.0, [0.0; 3], 1.0);
     assert_eq!(align(&MemberPair { member: &small, ..pair }), Err(Unaligned::NoPicture));
+}
+
+/// All of the member but a tenth is white: from small pictures, which tell next to nothing, the search came away by 30 % of a side.
+#[test]
+fn a_member_that_is_nearly_white_is_not_led_astray() {
+    let (size, focal) = ([400, 300], 380.0);
+    let turns = [[0.0, 1.5, 0.0], [0.006, 1.489, 0.009]];
+    let [reference, mut member] =
+        [(turns[0], 1.0), (turns[1], 2.0)].map(|(turn, exposure)| taken(size, focal, turn, exposure));
+    for y in 0..size[1] {
+        let row = member.row_mut(y);
+        row[..200].fill(255.0);
+        row[240..].fill(255.0);
+    }
+    let pair = MemberPair { reference: &reference, member: &member, stops: 1.0, shift: [0.0; 2], focal_px: None };
+    let aligned = align(&pair).expect("aligned");
+    let camera = Matrix3::new(focal, 0.0, 200.0, 0.0, focal, 150.0, 0.0, 0.0, 1.0);
+    let [reference, member] = turns.map(|turn| Rotation3::from_scaled_axis(Vector3::from(turn)));
+    let turn = member * reference.inverse();
+    let truth = trueup_core::geometry::Homography(camera * turn.matrix() * camera.try_inverse().expect("a camera"));
+    for place in [[200.0, 20.0], [220.0, 150.0], [240.0, 280.0]] {
+        let back = aligned.reference_from_member.apply(truth.apply(place.into()));
+        let off = (back - nalgebra::Vector2::from(place)).norm();
+        assert!(off < 0.5, "{off} px at {place:?}");
+    }
 }
