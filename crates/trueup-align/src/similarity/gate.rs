@@ -36,6 +36,8 @@ pub(super) struct CameraAngle {
     /// Root mean square of the photographs' rolls by it in radians, of those that were held alike, where nothing but the expectation that they look level tells
     /// how far up or down they look; `None` elsewhere.
     pub rolls: Option<f64>,
+    /// Whether cameras recorded gravity: then they know how they were held.
+    pub is_recorded: bool,
 }
 
 impl CameraAngle {
@@ -50,7 +52,7 @@ impl CameraAngle {
         let is_explained = match agreement {
             Agreement::Loose => false,
             Agreement::Close => held_level,
-            Agreement::CloseOfMany => true,
+            Agreement::CloseOfMany => !self.is_recorded,
         };
         !(is_near || is_within && is_explained)
     }
@@ -247,20 +249,24 @@ mod tests {
 
     #[test]
     fn photographs_that_look_up_alike_may_be_far_from_level() {
-        let refused_of = |photographs: usize, divergence: f64, angle_deg: f64, rolls_deg: Option<f64>| {
-            let rolls = rolls_deg.map(f64::to_radians);
-            let from_cameras = Some(CameraAngle { angle: angle_deg.to_radians(), deviations: 6.0, rolls });
-            let evidence = GateEvidence {
-                photographs,
-                inliers: photographs,
-                divergence,
-                from_cameras,
-                significance: Some(6.0),
-                median_roll: 0.05,
-                rolls: None,
-                by_level_lines: None,
+        let refused_where =
+            |is_recorded, photographs: usize, divergence: f64, angle_deg: f64, rolls_deg: Option<f64>| {
+                let (angle, rolls) = (angle_deg.to_radians(), rolls_deg.map(f64::to_radians));
+                let from_cameras = Some(CameraAngle { angle, deviations: 6.0, rolls, is_recorded });
+                let evidence = GateEvidence {
+                    photographs,
+                    inliers: photographs,
+                    divergence,
+                    from_cameras,
+                    significance: Some(6.0),
+                    median_roll: 0.05,
+                    rolls: None,
+                    by_level_lines: None,
+                };
+                failed_clause(&evidence, &SimilarityOptions::default()).is_some()
             };
-            failed_clause(&evidence, &SimilarityOptions::default()).is_some()
+        let refused_of = |photographs, divergence, angle_deg, rolls_deg| {
+            refused_where(false, photographs, divergence, angle_deg, rolls_deg)
         };
         let refused = |divergence, angle_deg, rolls_deg| refused_of(2, divergence, angle_deg, rolls_deg);
         assert!(!refused(0.0115, 30.0, Some(4.0)));
@@ -272,6 +278,7 @@ mod tests {
         assert!(refused_of(3, 0.0115, 30.0, None), "three meet by chance");
         assert!(!refused_of(4, 0.0115, 30.0, None), "four were all held rolled");
         assert!(refused_of(4, 0.0117, 30.0, None) && refused_of(4, 0.001, 37.0, None));
+        assert!(refused_where(true, 4, 0.001, 30.0, None), "they know how they were held");
     }
 
     /// 5 + (5 / 2.5)^2 / 2 / 2 = 6 standard deviations for rolls of 5 degrees, and never more than 7; 0.02 exp(2 (6.6 - 6) / 1.5) = 0.0445.

@@ -215,6 +215,7 @@ impl<'a> CameraLevel<'a> {
             angle: own.angle(down),
             deviations: squares.sqrt(),
             rolls: pitch_is_untold.then_some(rolls),
+            is_recorded: self.has_gravity,
         })
     }
 
