@@ -107,7 +107,7 @@ const EXPECTED_ROLL_DEG: f64 = 2.5;
 const MAX_CAMERA_ANGLE_DEG: f64 = 20.0;
 /// ... unless it is this few of the cameras' own deviations.
 const MAX_CAMERA_DEVIATIONS: f64 = 2.0;
-/// Largest angle of the same where photographs that all look up or down explain it, as two of a tower do, degrees. Beyond, what lies level before the camera
+/// Largest angle of the same where photographs that all look up or down explain it, as two of a tower do, or that were all held rolled, degrees. Beyond, what lies level before the camera
 /// may be taken for the vertical: with pitches that scatter by 20 degrees (reasoned), that they look the other way, onto a floor, is more than an eighth as probable.
 const MAX_STEEP_DEG: f64 = 36.0;
 /// Share of [`SimilarityOptions::max_divergence_few`] that is believed there: 2.3 times as many directions lie within 36 degrees of pitch and 20 of roll as within 20 of the vertical,

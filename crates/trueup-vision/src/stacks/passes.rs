@@ -34,9 +34,10 @@ pub(super) fn one_by_one(count: usize) -> ShotOrder {
     ShotOrder { numbers: (0..count).collect(), of_view: count.max(1) }
 }
 
-/// Passes over as many views each, two views at least: each in the direction of the first, or every other one back again.
+/// Passes over as many views each, two views at least: each in the direction of the first, or every other one back again. The most passes first: of four, every other two
+/// are two passes as well.
 pub(super) fn orders(count: usize) -> impl Iterator<Item = ShotOrder> {
-    let splits = (2..=MOST_PASSES).filter(move |passes| count.is_multiple_of(*passes) && count / passes >= 2);
+    let splits = (2..=MOST_PASSES).rev().filter(move |passes| count.is_multiple_of(*passes) && count / passes >= 2);
     splits.flat_map(move |passes| once(in_passes(count, passes, false)).chain(once(in_passes(count, passes, true))))
 }
 
@@ -60,10 +61,10 @@ mod tests {
     fn passes_go_round_or_there_and_back() {
         let found: Vec<(usize, Vec<usize>)> = orders(6).map(|order| (order.of_view, order.numbers)).collect();
         let expected = [
-            (2, vec![0, 3, 1, 4, 2, 5]),
-            (2, vec![0, 5, 1, 4, 2, 3]),
             (3, vec![0, 2, 4, 1, 3, 5]),
             (3, vec![0, 3, 4, 1, 2, 5]),
+            (2, vec![0, 3, 1, 4, 2, 5]),
+            (2, vec![0, 5, 1, 4, 2, 3]),
         ];
         assert_eq!(found, expected);
         for few in 0..4 {

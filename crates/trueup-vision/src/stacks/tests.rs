@@ -141,6 +141,8 @@ fn exposures_of_one_pass_after_the_other_are_stacks() {
     assert_eq!(back, [[0, 5, 6], [1, 4, 7], [2, 3, 8]].map(|stack| (stack.to_vec(), Vec::new())));
     assert!(found(&shots(false, 0.15, exposures)).is_empty(), "neighbors in a row");
     assert!(found(&shots(false, 0.0, [1.0; 3])).is_empty(), "one exposure");
+    let four = numbers(&found(&[0.25, 1.0, 4.0, 0.5].map(|one| DIRECTIONS.map(|yaw| ([0.0, yaw, 0.0], one))).concat()));
+    assert_eq!(four, [0, 1, 2].map(|first| (vec![first, first + 3, first + 6, first + 9], Vec::new())));
     let mut half = vec![(view(0, 0), 1.0), (view(0, 1), 1.0), (view(1, 0), 4.0), (view(1, 2), 4.0)];
     assert!(found(&half).is_empty(), "one view of two");
     half[3] = (view(1, 1), 4.0);
