@@ -21,7 +21,8 @@ use crate::job::inputs::{Inputs, Reference};
 use crate::job::names::reference_named;
 use crate::memo::{Key, KeyMaker};
 use crate::report::left_out::{
-    LeftOut, counts, explain, no_photograph, none_usable, not_in_graph, reason_of_rejected, strength,
+    LeftOut, counts, explain, no_photograph, none_usable, not_in_graph, of_another_panorama, reason_of_rejected,
+    strength,
 };
 use crate::report::several::several;
 
@@ -166,6 +167,10 @@ impl Matched {
         let edges = &self.graph_file.edges;
         if !edges.is_empty() && !edges.iter().any(|&(a, b)| a == index || b == index) {
             return not_in_graph();
+        }
+        let is_of = |members: &&Vec<usize>| members.len() > 1 && members.contains(&index);
+        if let Some(members) = self.graph.components.iter().find(is_of) {
+            return of_another_panorama(members, &self.set.names());
         }
         let component = stitched.first().map_or(&[][..], Vec::as_slice);
         explain(index, component, &self.pairs, &self.set.names())

@@ -15,19 +15,25 @@ pub(crate) struct LeftOut {
     pub hint: String,
 }
 
-/// Why photograph `photograph` is not joined to the stitched component `component`.
+/// Why the photographs `members`, which overlap one another, are in no panorama: another one is stitched. The same for each of them, so that they are told together.
+pub(crate) fn of_another_panorama(members: &[usize], names: &[String]) -> LeftOut {
+    let of = match members {
+        [one, other] => format!("that of {} and {}", names[*one], names[*other]),
+        [first, others @ ..] => format!("that of {} and {} more", names[*first], others.len()),
+        [] => String::new(),
+    };
+    LeftOut {
+        code: "other-panorama",
+        reason: format!("part of another panorama, {of}"),
+        hint: "Use --all to stitch every group of overlapping photographs.".to_owned(),
+    }
+}
+
+/// Why photograph `photograph`, which overlaps no other one, is not joined to the stitched component `component`.
 ///
 /// `names` are the photographs' names, `pairs` every pair tried.
 pub(crate) fn explain(photograph: usize, component: &[usize], pairs: &[PairMatches], names: &[String]) -> LeftOut {
     let touching = |pair: &&PairMatches| pair.a == photograph || pair.b == photograph;
-    if let Some(joined) = pairs.iter().filter(touching).find(|pair| pair.verdict.is_joined()) {
-        let neighbor = other(joined, photograph);
-        return LeftOut {
-            code: "other-panorama",
-            reason: format!("part of another panorama, with {}", names[neighbor]),
-            hint: "Use --all to stitch every group of overlapping photographs.".to_owned(),
-        };
-    }
     let best = pairs
         .iter()
         .filter(touching)
@@ -173,8 +179,8 @@ mod tests {
 
     #[test]
     fn members_of_another_panorama_are_told_so() {
-        let left_out = explain(3, &[0, 1], &[pair(2, 3, 40, PairVerdict::Joined)], &names());
-        assert_eq!(left_out.code, "other-panorama");
-        assert!(left_out.reason.contains("2.jpg"));
+        let reason = |members: &[usize]| of_another_panorama(members, &names()).reason;
+        assert_eq!(reason(&[2, 3]), "part of another panorama, that of 2.jpg and 3.jpg");
+        assert_eq!(reason(&[0, 1, 3]), "part of another panorama, that of 0.jpg and 2 more");
     }
 }
