@@ -169,9 +169,13 @@ impl<'a> SceneDirections<'a> {
     /// How the photographs' directions agree on `dominant`.
     fn agreement(&self, dominant: &Dominant) -> Agreement {
         let inliers = self.inliers(dominant);
+        Agreement::of(inliers.len(), self.divergence(dominant, &inliers), self.options)
+    }
+
+    /// How far the directions of `inliers` diverge from `dominant`.
+    fn divergence(&self, dominant: &Dominant, inliers: &[usize]) -> f64 {
         let residuals: Vec<f64> = inliers.iter().filter_map(|&index| dominant.residuals[index]).collect();
-        let divergence = divergence(&residuals, self.level.rotations.len(), self.options.as_printed.divergence);
-        Agreement::of(inliers.len(), divergence, self.options)
+        divergence(&residuals, self.level.rotations.len(), self.options.as_printed.divergence)
     }
 
     /// Photographs whose directions agree with `dominant`.
@@ -206,12 +210,11 @@ impl<'a> SceneDirections<'a> {
         let mut magnitudes: Vec<f64> =
             self.own_rolls(&dominant.frame, &down, &inliers).into_iter().flatten().map(f64::abs).collect();
         magnitudes.sort_by(f64::total_cmp);
-        let residuals: Vec<f64> = inliers.iter().filter_map(|&index| dominant.residuals[index]).collect();
         let photographs = self.level.rotations.len();
         let evidence = GateEvidence {
             photographs,
             inliers: inliers.len(),
-            divergence: divergence(&residuals, photographs, self.options.as_printed.divergence),
+            divergence: self.divergence(dominant, &inliers),
             from_cameras: self.level.angle_to(&down),
             significance: guidance.significance,
             // Photographs may lie on their sides where gravity says so.

@@ -260,7 +260,21 @@ fn where_an_exposure_comes_again_another_stack_begins() {
     assert_eq!(stacks.iter().map(|stack| stack.others.len()).collect::<Vec<_>>(), [2, 2]);
 }
 
-/// The homography of a turn, K R K^-1, with the focal length unknown to the alignment.
+/// How far from its true place in the member a place of the reference is aligned, seen in the reference: by the homography of the turn, K R K^-1.
+fn off_px(
+    aligned: &AlignedMember,
+    [width, height]: [usize; 2],
+    focal: f64,
+    turn: &Rotation3<f64>,
+    place: [f64; 2],
+) -> f64 {
+    let camera = Matrix3::new(focal, 0.0, width as f64 / 2.0, 0.0, focal, height as f64 / 2.0, 0.0, 0.0, 1.0);
+    let truth = trueup_core::geometry::Homography(camera * turn.matrix() * camera.try_inverse().expect("a camera"));
+    let back = aligned.reference_from_member.apply(truth.apply(place.into()));
+    (back - nalgebra::Vector2::from(place)).norm()
+}
+
+/// With the focal length unknown to the alignment.
 #[test]
 fn a_member_is_aligned_to_a_small_part_of_a_pixel() {
     let (size, focal) = ([400, 300], 380.0);
@@ -275,14 +289,9 @@ fn a_member_is_aligned_to_a_small_part_of_a_pixel() {
             focal_px: None,
         };
         let aligned = align(&pair).expect("aligned");
-        let camera = Matrix3::new(focal, 0.0, 200.0, 0.0, focal, 150.0, 0.0, 0.0, 1.0);
-        let member_from_reference = camera
-            * Rotation3::from_scaled_axis(Vector3::from(turn)).matrix()
-            * camera.try_inverse().expect("a camera");
-        let truth = trueup_core::geometry::Homography(member_from_reference);
+        let turn = Rotation3::from_scaled_axis(Vector3::from(turn));
         for place in [[10.0, 10.0], [390.0, 20.0], [200.0, 150.0], [20.0, 280.0], [380.0, 290.0]] {
-            let back = aligned.reference_from_member.apply(truth.apply(place.into()));
-            let off = (back - nalgebra::Vector2::from(place)).norm();
+            let off = off_px(&aligned, size, focal, &turn, place);
             assert!(off < 0.1, "{off} px at {place:?} of {reference} and {member}");
         }
     }
@@ -318,13 +327,10 @@ fn a_member_that_is_nearly_white_is_not_led_astray() {
     }
     let pair = MemberPair { reference: &reference, member: &member, stops: 1.0, shift: [0.0; 2], focal_px: None };
     let aligned = align(&pair).expect("aligned");
-    let camera = Matrix3::new(focal, 0.0, 200.0, 0.0, focal, 150.0, 0.0, 0.0, 1.0);
     let [reference, member] = turns.map(|turn| Rotation3::from_scaled_axis(Vector3::from(turn)));
     let turn = member * reference.inverse();
-    let truth = trueup_core::geometry::Homography(camera * turn.matrix() * camera.try_inverse().expect("a camera"));
     for place in [[200.0, 20.0], [220.0, 150.0], [240.0, 280.0]] {
-        let back = aligned.reference_from_member.apply(truth.apply(place.into()));
-        let off = (back - nalgebra::Vector2::from(place)).norm();
+        let off = off_px(&aligned, size, focal, &turn, place);
         assert!(off < 0.5, "{off} px at {place:?}");
     }
 }

@@ -182,5 +182,6 @@ mod tests {
         let reason = |members: &[usize]| of_another_panorama(members, &names()).reason;
         assert_eq!(reason(&[2, 3]), "part of another panorama, that of 2.jpg and 3.jpg");
         assert_eq!(reason(&[0, 1, 3]), "part of another panorama, that of 0.jpg and 2 more");
+        assert_eq!(of_another_panorama(&[2, 3], &names()).code, "other-panorama");
     }
 }
