@@ -86,7 +86,7 @@ pub fn consistent_matches(
     let found = |k: usize| PointMatch { in_a: points.in_a[k].into(), in_b: points.in_b[k].into() };
     let refiner = Refiner { a: &a.features.surroundings, b: &b.features.surroundings };
     let matches = agreeing.into_iter().map(found).collect();
-    Ok(refiner.refined(matches, |point| Some(most.b_from_a.apply(point))).matches)
+    Ok(refiner.refined(matches, |point| Some(most.b_from_a.apply(point))))
 }
 
 /// How matches moved beside a homography, and whether their neighbors moved alike.

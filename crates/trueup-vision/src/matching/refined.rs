@@ -1,4 +1,5 @@
-//! Places of matches, more exact than those of features: what surrounds the one is found again around the other.
+//! Places of matches, more exact than those of features, and whether matches can be believed: what surrounds the one is found again around the
+//! other.
 
 use std::sync::LazyLock;
 
@@ -8,33 +9,35 @@ use trueup_core::raster::Raster;
 
 use crate::gray::gray_at;
 
-/// Radius of the window, in pixels of photograph a.
-const RADIUS_PX: i32 = 5;
-/// Deviation of the window's Gaussian weights, in pixels of photograph a.
-const DEVIATION_PX: f64 = 2.5;
-/// Farthest that a match moves, in pixels of photograph a; what went farther is something else.
-const FARTHEST_PX: f64 = 2.0;
+/// Radius of the window, in samples; those of the finest windows are pixels of photograph a.
+const RADIUS: i32 = 5;
+/// Deviation of the window's Gaussian weights, in samples.
+const DEVIATION: f64 = 2.5;
+/// Farthest that a match moves, in samples; what went farther is something else.
+const FARTHEST: f64 = 2.0;
 /// Steps at most.
 const ROUNDS: usize = 10;
-/// A step shorter than this is the last one, in pixels of photograph a.
-const CONVERGED_PX: f64 = 0.01;
-/// A match keeps its place where the new one is less certain than this, by its standard deviation in pixels of photograph a: of places in cut
+/// A step shorter than this is the last one, in samples.
+const CONVERGED: f64 = 0.01;
+/// A match keeps its place where the new one is less certain than this, by its standard deviation in samples: of places in cut
 /// photographs (four rows of known cameras) those of features err by 0.45 px where that is 0.2, and the new ones by 0.2.
-const LARGEST_DEVIATION_PX: f64 = 0.2;
+const LARGEST_DEVIATION: f64 = 0.2;
+/// Distance of the samples by which a match is confirmed, in scales of its feature: what told a large feature is not in the finest window.
+const SPACING_PER_SCALE: f64 = 0.5;
+
+/// A match and how large its feature in photograph a is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ScaledMatch {
+    pub(super) at: PointMatch,
+    /// The feature's scale, in pixels of photograph a.
+    pub(super) scale_px: f64,
+}
 
 /// Finds what surrounds points of photograph a again in photograph b.
 pub(super) struct Refiner<'a> {
     /// The pictures around features of both photographs.
     pub(super) a: &'a Raster<u8>,
     pub(super) b: &'a Raster<u8>,
-}
-
-/// Matches that were placed anew.
-pub(super) struct Refined {
-    /// All of them, in their order.
-    pub(super) matches: Vec<PointMatch>,
-    /// How many have surroundings in a that were found again in b; the others are where they were.
-    pub(super) found_again: usize,
 }
 
 impl Refiner<'_> {
@@ -46,38 +49,53 @@ impl Refiner<'_> {
     /// 2004 (inverse compositional); gain and offset of the light are fitted along.
     pub(super) fn refined(
         &self,
-        matches: Vec<PointMatch>,
+        mut matches: Vec<PointMatch>,
         b_from_a: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
-    ) -> Refined {
-        let mut refined = Refined { matches, found_again: 0 };
-        for one in &mut refined.matches {
-            if let Some(place) = self.found_again(one, &b_from_a) {
+    ) -> Vec<PointMatch> {
+        for one in &mut matches {
+            if let Some(place) = self.found_again(one, 1.0, &b_from_a) {
                 one.in_b = place.into();
-                refined.found_again += 1;
             }
         }
-        refined
+        matches
     }
 
+    /// How many of the matches have surroundings in a, as wide as their features are large, that are found again in b.
+    pub(super) fn confirmed(
+        &self,
+        matches: &[ScaledMatch],
+        b_from_a: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
+    ) -> usize {
+        let spacing_px = |one: &ScaledMatch| (SPACING_PER_SCALE * one.scale_px).max(1.0);
+        matches.iter().filter(|one| self.found_again(&one.at, spacing_px(one), &b_from_a).is_some()).count()
+    }
+
+    /// Whether the pictures of both photographs are known.
+    pub(super) fn sees(&self) -> bool {
+        [self.a, self.b].iter().all(|picture| !picture.data().is_empty())
+    }
+
+    /// Where in b a window of samples `spacing_px` apart around the match in a is found again.
     fn found_again(
         &self,
         one: &PointMatch,
+        spacing_px: f64,
         b_from_a: &impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
     ) -> Option<Vector2<f64>> {
         let (in_a, start) = (Vector2::from(one.in_a), Vector2::from(one.in_b));
-        let shape = derivative(in_a, b_from_a)?;
+        let shape = derivative(in_a, b_from_a)? * spacing_px;
         let a_from_b = shape.try_inverse()?;
-        let template = Template::of(self.a, in_a)?;
+        let template = Template::of(self.a, in_a, spacing_px)?;
         let mut place = start;
         for _ in 0..ROUNDS {
             let seen = Window::of(self.b, place, &shape)?;
             let difference = template.difference(&seen)?;
             place -= shape * difference.step;
-            if (a_from_b * (place - start)).norm() > FARTHEST_PX {
+            if (a_from_b * (place - start)).norm() > FARTHEST {
                 return None;
             }
-            if difference.step.norm() < CONVERGED_PX {
-                return (difference.deviation_px <= LARGEST_DEVIATION_PX).then_some(place);
+            if difference.step.norm() < CONVERGED {
+                return (difference.deviation <= LARGEST_DEVIATION).then_some(place);
             }
         }
         None
@@ -93,7 +111,7 @@ fn derivative(point: Vector2<f64>, map: &impl Fn(Vector2<f64>) -> Option<Vector2
 
 /// A place of the window.
 struct WindowPoint {
-    /// From its middle, in pixels of photograph a.
+    /// From its middle, in samples.
     offset: Vector2<f64>,
     weight: f64,
 }
@@ -107,13 +125,13 @@ struct WindowPoints {
 }
 
 static WINDOW: LazyLock<WindowPoints> = LazyLock::new(|| {
-    let across = -RADIUS_PX..=RADIUS_PX;
+    let across = -RADIUS..=RADIUS;
     let offsets = across.clone().flat_map(|y| across.clone().map(move |x| Vector2::new(f64::from(x), f64::from(y))));
     let point = |offset: Vector2<f64>| {
-        let weight = (-offset.norm_squared() / (2.0 * DEVIATION_PX.powi(2))).exp();
+        let weight = (-offset.norm_squared() / (2.0 * DEVIATION.powi(2))).exp();
         WindowPoint { offset, weight }
     };
-    let all: Vec<WindowPoint> = offsets.filter(|offset| offset.norm() <= f64::from(RADIUS_PX)).map(point).collect();
+    let all: Vec<WindowPoint> = offsets.filter(|offset| offset.norm() <= f64::from(RADIUS)).map(point).collect();
     let samples: f64 = all.iter().map(|point| point.weight).sum();
     let points = all.into_iter().map(|point| WindowPoint { weight: point.weight / samples, ..point }).collect();
     WindowPoints { points, samples }
@@ -127,9 +145,9 @@ struct Window {
 }
 
 impl Window {
-    /// The window around a place of a picture, of this shape; `None` where it reaches out of it.
+    /// The window around a place of a picture, each sample of which comes to `shape` there; `None` where it reaches out of it.
     fn of(picture: &Raster<u8>, place: Vector2<f64>, shape: &Matrix2<f64>) -> Option<Self> {
-        let reach = |axis: usize| f64::from(RADIUS_PX) * shape.row(axis).norm();
+        let reach = |axis: usize| f64::from(RADIUS) * shape.row(axis).norm();
         let length = [picture.width(), picture.height()];
         // A comparison with NaN is false.
         let is_inside =
@@ -160,24 +178,24 @@ struct Template {
     gradients: Vec<Vector2<f64>>,
     /// The inverse of the weighted sum of gradients times themselves.
     inverse: Matrix2<f64>,
-    /// The least that a pixel's way changes the window, whichever the direction: weighted mean square, gray levels per pixel.
+    /// The least that a sample's way changes the window, whichever the direction: weighted mean square, gray levels per sample.
     least_change: f64,
 }
 
 /// How a window differs from a template.
 struct Difference {
-    /// How far it lies from where it is alike, in pixels of photograph a.
+    /// How far it lies from where it is alike, in samples.
     step: Vector2<f64>,
     /// Standard deviation of the step by what is left of the difference.
-    deviation_px: f64,
+    deviation: f64,
 }
 
 impl Template {
-    /// `None` at the border, and where nothing tells a place in some direction.
-    fn of(picture: &Raster<u8>, place: Vector2<f64>) -> Option<Self> {
-        let identity = Matrix2::identity();
-        let window = Window::of(picture, place, &identity)?;
-        let moved = |x: f64, y: f64| Window::of(picture, place + Vector2::new(x, y), &identity);
+    /// Of samples `spacing_px` apart. `None` at the border, and where nothing tells a place in some direction.
+    fn of(picture: &Raster<u8>, place: Vector2<f64>, spacing_px: f64) -> Option<Self> {
+        let shape = Matrix2::from_diagonal_element(spacing_px);
+        let window = Window::of(picture, place, &shape)?;
+        let moved = |x: f64, y: f64| Window::of(picture, place + Vector2::new(x, y) * spacing_px, &shape);
         let [left, right, above, below] = [moved(-1.0, 0.0)?, moved(1.0, 0.0)?, moved(0.0, -1.0)?, moved(0.0, 1.0)?];
         let half = |one: f64, other: f64| (one - other) / 2.0;
         let gradients: Vec<Vector2<f64>> = (0..WINDOW.points.len())
@@ -203,8 +221,8 @@ impl Template {
             change += point.weight * left * gradient;
             square += point.weight * left * left;
         }
-        let deviation_px = (square / (WINDOW.samples * self.least_change)).sqrt();
-        Some(Difference { step: self.inverse * change, deviation_px })
+        let deviation = (square / (WINDOW.samples * self.least_change)).sqrt();
+        Some(Difference { step: self.inverse * change, deviation })
     }
 }
 
@@ -240,7 +258,7 @@ mod tests {
             let off = Vector2::new(f64::from(k % 5) - 2.0, f64::from(k % 3) - 1.0) * 0.45;
             let truth = b_from_a(in_a);
             let one = PointMatch { in_a: in_a.into(), in_b: (truth + off).into() };
-            let found = refiner.refined(vec![one], |point| Some(b_from_a(point))).matches.remove(0);
+            let found = refiner.refined(vec![one], |point| Some(b_from_a(point))).remove(0);
             assert_eq!(found.in_a, one.in_a);
             if found != one {
                 moved += 1;
@@ -269,12 +287,12 @@ mod tests {
             (&waves, &other, middle),
         ] {
             let one = PointMatch { in_a, in_b: [in_a[0] + 0.6, in_a[1] - 0.3] };
-            assert_eq!(Refiner { a, b }.refined(vec![one], Some).matches, [one]);
+            assert_eq!(Refiner { a, b }.refined(vec![one], Some), [one]);
         }
         let one = PointMatch { in_a: middle, in_b: [f64::NAN, 3.0] };
-        let kept = Refiner { a: &waves, b: &waves }.refined(vec![one], Some).matches.remove(0);
+        let kept = Refiner { a: &waves, b: &waves }.refined(vec![one], Some).remove(0);
         assert!(kept.in_b[0].is_nan());
         let one = PointMatch { in_a: middle, in_b: middle };
-        assert_eq!(Refiner { a: &waves, b: &waves }.refined(vec![one], |_| None).matches, [one]);
+        assert_eq!(Refiner { a: &waves, b: &waves }.refined(vec![one], |_| None), [one]);
     }
 }

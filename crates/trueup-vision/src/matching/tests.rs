@@ -89,6 +89,18 @@ fn push(features: &mut Features, position: Vector2<f64>, descriptors: &[Descript
     features.descriptor_points.extend(descriptors.iter().map(|_| owner));
 }
 
+/// A picture of waves along two directions.
+fn waves(scene_from_picture: &dyn Fn(Vector2<f64>) -> Vector2<f64>) -> Raster<u8> {
+    let value = |place: Vector2<f64>| {
+        let sum = (0.5 * place.x + 0.1 * place.y).sin() + (0.6 * place.y - 0.2 * place.x).sin();
+        (110.0 + 40.0 * sum).round() as u8
+    };
+    let (width, height) = (WIDTH as usize, HEIGHT as usize);
+    let place = |k: usize| Vector2::new((k % width) as f64 + 0.5, (k / width) as f64 + 0.5);
+    let values = (0..width * height).map(|k| value(scene_from_picture(place(k)))).collect();
+    Raster::from_data(width, height, 1, values).expect("as many")
+}
+
 /// A turn to the right by a third of the width, with some roll.
 fn example_map() -> Homography {
     Homography(Matrix3::new(0.98, -0.05, -260.0, 0.06, 1.01, -20.0, 1.5e-4, 2e-5, 1.0))
@@ -336,6 +348,34 @@ fn a_few_matches_elsewhere_in_depth_are_not_believed() {
     assert_eq!([elsewhere(0), elsewhere(7), elsewhere(12)], [0, 0, 12]);
 }
 
+/// A near thing of 12 points, 14 px from where the plane has it: once photograph b shows it there, once it shows the plane, and what looks like the
+/// thing is not.
+#[test]
+fn matches_elsewhere_in_depth_are_believed_if_what_surrounds_them_is_found_again() {
+    let truth = example_map();
+    let back = Homography(truth.0.try_inverse().expect("regular"));
+    let aside = Vector2::new(14.0, 0.0);
+    let is_near = |place: &Vector2<f64>| (480.0..580.0).contains(&place.x) && (230.0..310.0).contains(&place.y);
+    let elsewhere = |is_there: bool| {
+        let mut generator = generator(17);
+        let mut photographs = PhotographPair::default();
+        photographs.add_plane(&truth, 200, 0.3, &mut generator);
+        for k in 0..12 {
+            let in_a = Vector2::new(500.0 + 17.0 * f64::from(k % 4), 250.0 + 19.0 * f64::from(k / 4));
+            photographs.add(in_a, truth.apply(in_a) + aside, &mut generator);
+        }
+        let in_scene = |place: Vector2<f64>| {
+            Some(back.apply(place - aside)).filter(|near| is_there && is_near(near)).unwrap_or(back.apply(place))
+        };
+        photographs.a.surroundings = waves(&|place| place);
+        photographs.b.surroundings = waves(&in_scene);
+        let matched = photographs.matched(false, &MatchingOptions::default());
+        assert!(matched.inliers.len() >= 200);
+        matched.elsewhere.len()
+    };
+    assert_eq!([elsewhere(true), elsewhere(false)], [12, 0]);
+}
+
 /// Forty points of a plane, sixty before it on something round, and sixty that only look alike: too few agree with the plane alone.
 #[test]
 fn what_lies_before_a_plane_joins_a_pair_with_it() {
@@ -367,20 +407,10 @@ fn what_lies_before_a_plane_joins_a_pair_with_it() {
 fn matches_are_placed_by_what_surrounds_them() {
     let truth = example_map();
     let back = Homography(truth.0.try_inverse().expect("regular"));
-    let waves = |place: Vector2<f64>| {
-        let sum = (0.5 * place.x + 0.1 * place.y).sin() + (0.6 * place.y - 0.2 * place.x).sin();
-        (110.0 + 40.0 * sum).round() as u8
-    };
-    let picture = |scene_from_picture: &dyn Fn(Vector2<f64>) -> Vector2<f64>| {
-        let (width, height) = (WIDTH as usize, HEIGHT as usize);
-        let place = |k: usize| Vector2::new((k % width) as f64 + 0.5, (k / width) as f64 + 0.5);
-        let values = (0..width * height).map(|k| waves(scene_from_picture(place(k)))).collect();
-        Raster::from_data(width, height, 1, values).expect("as many")
-    };
     let mut photographs = PhotographPair::default();
     photographs.add_plane(&truth, 200, 0.6, &mut generator(31));
-    photographs.a.surroundings = picture(&|place| place);
-    photographs.b.surroundings = picture(&|place| back.apply(place));
+    photographs.a.surroundings = waves(&|place| place);
+    photographs.b.surroundings = waves(&|place| back.apply(place));
     let matched = photographs.matched(false, &MatchingOptions::default());
     let error = |one: &PointMatch| (Vector2::from(one.in_b) - truth.apply(one.in_a.into())).norm();
     let exact = matched.inliers.iter().filter(|one| error(one) < 0.05).count();
