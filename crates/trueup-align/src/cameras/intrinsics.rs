@@ -12,6 +12,8 @@ pub(super) const FOCAL: usize = 0;
 pub(super) const CENTER: usize = 1;
 /// First of the four radial terms.
 pub(super) const RADIAL: usize = 3;
+/// The first two, of which the others follow seldom.
+pub(super) const RADIAL_TERMS: [usize; 2] = [RADIAL, RADIAL + 1];
 /// First of the two tangential terms.
 pub(super) const TANGENTIAL: usize = 7;
 
@@ -156,6 +158,13 @@ impl IntrinsicsModel {
 /// The focal length alone.
 pub(super) fn only_focal() -> FreeTerms {
     std::array::from_fn(|intrinsic| intrinsic == FOCAL)
+}
+
+/// Frees `terms` of the groups for which it is `told`.
+pub(super) fn set_free(free: &mut [FreeTerms], terms: &[usize], told: &[bool]) {
+    for (free, _) in free.iter_mut().zip(told).filter(|(_, told)| **told) {
+        terms.iter().for_each(|&term| free[term] = true);
+    }
 }
 
 #[cfg(test)]

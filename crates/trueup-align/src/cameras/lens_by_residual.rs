@@ -9,8 +9,8 @@ use trueup_core::matches::PointMatch;
 use trueup_core::statistics::median;
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
-use super::intrinsics::{FreeTerms, IntrinsicsModel, RADIAL};
-use super::lenses::{LensSearch, set};
+use super::intrinsics::{FreeTerms, IntrinsicsModel, RADIAL_TERMS, set_free};
+use super::lenses::LensSearch;
 use super::levenberg_marquardt::SETTLED;
 use super::observations::PairObservations;
 use super::transfer::CameraTransfer;
@@ -25,8 +25,6 @@ const MOST_LEFT: f64 = 1.0 / 16.0;
 const PROMISING: f64 = 0.25;
 /// When the cameras of that look are near enough: a step that saves less than this share of the cost is the last.
 const NEARLY_SETTLED: f64 = 1e-4;
-/// The terms that may be believed so. What is off center is too much like a turn.
-pub(super) const RADIAL_TERMS: [usize; 2] = [RADIAL, RADIAL + 1];
 /// A match that is farther off than so many times the median counts as if it were so far off: false ones have large errors, which nothing explains.
 const FARTHEST_IN_MEDIANS: f64 = 4.0;
 
@@ -42,7 +40,8 @@ impl LensSearch<'_> {
         free: &mut [FreeTerms],
     ) -> Result<bool> {
         let mut wished = free.to_vec();
-        set(&mut wished, terms, of);
+        set_free(&mut wished, terms, of);
+        // What is off center is too much like a turn.
         let is_asked = terms.iter().all(|term| RADIAL_TERMS.contains(term)) && wished != *free;
         if !is_asked || self.problem.observations.pairs.len() > FEW_OVERLAPS {
             return Ok(false);

@@ -3,8 +3,9 @@
 use trueup_core::{Result, StageContext};
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
-use super::intrinsics::{CENTER, FOCAL, FreeTerms, IntrinsicsModel, RADIAL, TANGENTIAL, ZOOM_SPREAD, only_focal};
-use super::lens_by_residual::RADIAL_TERMS;
+use super::intrinsics::{
+    CENTER, FOCAL, FreeTerms, IntrinsicsModel, RADIAL, RADIAL_TERMS, TANGENTIAL, ZOOM_SPREAD, only_focal, set_free,
+};
 use super::lens_evidence::{LensEvidence, Witness};
 use super::options::LensKind;
 use super::prior::CameraPrior;
@@ -93,7 +94,7 @@ impl LensSearch<'_> {
                 self.is_explained_by(terms, &bent, &mut parameters, group_of, &mut free)?;
                 continue;
             }
-            set(&mut free, terms, &believed);
+            set_free(&mut free, terms, &believed);
             let model = IntrinsicsModel::grouped(group_of, &free);
             parameters = problem.minimize(parameters, &model, FINE_HUBER_PX, self.context)?;
         }
@@ -141,7 +142,7 @@ impl LensSearch<'_> {
         let mut wished = free.to_vec();
         while bent.contains(&true) {
             wished.clone_from_slice(free);
-            set(&mut wished, terms, &bent);
+            set_free(&mut wished, terms, &bent);
             let model = IntrinsicsModel::grouped(group_of, &wished);
             let coarse = problem.minimize(parameters.clone(), &model, COARSE_HUBER_PX, self.context)?;
             let fine = problem.minimize(coarse, &model, FINE_HUBER_PX, self.context)?;
@@ -263,13 +264,6 @@ struct Ask<'a> {
     of: &'a [bool],
     /// Limit of the loss.
     huber_px: f64,
-}
-
-/// Frees `terms` of the groups for which it is `told`.
-pub(super) fn set(free: &mut [FreeTerms], terms: &[usize], told: &[bool]) {
-    for (free, _) in free.iter_mut().zip(told).filter(|(_, told)| **told) {
-        terms.iter().for_each(|&term| free[term] = true);
-    }
 }
 
 /// The settings of zoomed lenses: photographs of a group whose focal lengths are alike, as a number for each.

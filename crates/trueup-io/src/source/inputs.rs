@@ -70,7 +70,7 @@ fn expand_folder(folder: PathBuf) -> Vec<Candidate> {
             return vec![Candidate::Rejected(folder, rejection)];
         }
     };
-    let files = entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| !is_hidden(path));
+    let files = entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| !pattern::is_hidden(path));
     let candidates = photographs_in_natural_order(files);
     if candidates.is_empty() {
         let rejection = Rejection::new(
@@ -117,8 +117,4 @@ fn photographs_in_natural_order(paths: impl Iterator<Item = PathBuf>) -> Vec<Can
 pub fn natural_order(a: &Path, b: &Path) -> Ordering {
     let (a_text, b_text) = (a.to_string_lossy(), b.to_string_lossy());
     natord::compare_ignore_case(&a_text, &b_text).then_with(|| a.cmp(b))
-}
-
-pub(super) fn is_hidden(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
 }

@@ -12,6 +12,11 @@ const OPTIONS: MatchOptions =
 /// What begins a part of a pattern that is no plain name.
 pub(super) const WILDCARDS: [char; 3] = ['*', '?', '['];
 
+/// Whether a name begins with a dot, so that neither folders nor patterns mean it unasked.
+pub(super) fn is_hidden(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
+}
+
 /// What one component of a pattern stands for.
 enum Part {
     Literal(PathBuf),
@@ -64,7 +69,7 @@ fn descend(folder: PathBuf, parts: &[Part], found: &mut Vec<PathBuf>) {
             for entry in entries(&folder) {
                 // A link may lead back to where it is.
                 let is_folder = entry.symlink_metadata().is_ok_and(|metadata| metadata.is_dir());
-                if is_folder && !super::inputs::is_hidden(&entry) {
+                if is_folder && !is_hidden(&entry) {
                     descend(entry, parts, found);
                 }
             }

@@ -12,7 +12,8 @@ use super::threads::thread_pool;
 use super::write::Written;
 use crate::options::StitchOptions;
 use crate::pipeline::Stitcher;
-use crate::project::read::{Recorded, place_of};
+use crate::project::paths::place_of;
+use crate::project::read::Recorded;
 use crate::project::record::Project;
 
 /// Which recorded panorama to compose, of which photographs, and where to put it.

@@ -14,7 +14,7 @@ use trueup_io::source::{InMemory, SourceOptions};
 use trueup_vision::features::Features;
 
 use super::names::photograph_named;
-use crate::project::read::place_of;
+use crate::project::paths::{file_name, place_of};
 
 /// What a mask means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -51,7 +51,7 @@ pub struct MaskRecord {
 impl MaskRecord {
     /// The file's name without folders; paths written on another system are understood.
     pub fn file_name(&self) -> &str {
-        self.path.rsplit(['/', '\\']).next().unwrap_or(&self.path)
+        file_name(&self.path)
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub(crate) mod fill;
 pub(crate) mod hugin;
+pub(crate) mod paths;
 pub(crate) mod projection;
 pub(crate) mod provenance;
 pub(crate) mod read;

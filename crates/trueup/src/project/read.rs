@@ -1,6 +1,6 @@
 //! A panorama's geometry and photographs, found again from its project.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use trueup_align::metrics::without_torn_cells;
 use trueup_compose::crop::Crop;
@@ -12,8 +12,9 @@ use trueup_core::source::{SourceImage, StackMember};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::{self, RejectedSource, SourceOptions};
 
+use super::paths::place_of;
 use super::projection::ProjectionRecord;
-use super::record::{Canvas, ImageRecord, MeshRecord, Project, StackMemberRecord, file_name};
+use super::record::{Canvas, ImageRecord, MeshRecord, Project, StackMemberRecord};
 
 /// What a project must be to be read again.
 const AS_WRITTEN: &str = "Give a project file as `trueup stitch --project` wrote it.";
@@ -246,14 +247,6 @@ pub(crate) fn find_photograph(
         image.stack.push(StackMember { source, reference_from_member: member.reference_from_member });
     }
     Ok(image)
-}
-
-/// Where the file of a recorded path is: beside the project file as recorded, from the current folder, or beside the project file by its
-/// name alone; `None` if it is at none of these places.
-pub(crate) fn place_of(recorded: &str, project_folder: &Path) -> Option<PathBuf> {
-    let path = Path::new(recorded);
-    let places = [project_folder.join(path), path.to_owned(), project_folder.join(file_name(recorded))];
-    places.into_iter().find(|path| path.is_file())
 }
 
 /// The file of a recorded path, at its [place](place_of).

@@ -18,6 +18,7 @@ use trueup_core::matches::PairVerdict;
 use trueup_core::outline::Outline;
 use trueup_io::source::unique_names;
 
+use super::paths::file_name;
 use super::projection::ProjectionRecord;
 use crate::job::masks::MaskRecord;
 use crate::options::StitchOptions;
@@ -406,11 +407,6 @@ impl ImageRecord {
     pub fn file_name(&self) -> &str {
         file_name(&self.path)
     }
-}
-
-/// The name of the file that a recorded path ends in, whatever system wrote it.
-pub(crate) fn file_name(path: &str) -> &str {
-    path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
 impl Project {
