@@ -6,10 +6,7 @@ use std::path::{Path, PathBuf};
 
 use trueup_core::{Error, Result};
 
-use super::foreign;
-
-/// The file in a set's folder that is there while a program works at it, and after one that was killed at it.
-pub(super) const FILE: &str = "at-work";
+use super::{foreign, names};
 
 /// The byte in it for every beginning.
 const BEGINNING: u8 = b'.';
@@ -37,7 +34,7 @@ impl Claim {
     /// [`Error::Io`]; [`Error::Input`] if a file of that name is there that no batch has written.
     pub(super) fn take(folder: &Path) -> Result<Option<Self>> {
         std::fs::create_dir_all(folder).map_err(|error| Error::io("making", folder, error))?;
-        let path = folder.join(FILE);
+        let path = folder.join(names::CLAIM);
         let wrong = |error| Error::io("writing", &path, error);
         let mut file = File::options().create(true).read(true).append(true).open(&path).map_err(wrong)?;
         let is_locked = match file.try_lock() {
@@ -67,7 +64,7 @@ impl Claim {
 
     /// Whether work at the set of this folder was begun and did not end, or has not yet.
     pub(super) fn is_begun(folder: &Path) -> bool {
-        folder.join(FILE).exists()
+        folder.join(names::CLAIM).exists()
     }
 
     /// Gives the set up, when all is said of it or it is to be begun anew: nothing tells of this work any more.
@@ -124,7 +121,7 @@ mod tests {
     #[test]
     fn a_file_that_was_taken_away_is_no_claim() {
         let desk = tempfile::tempdir().expect("a folder");
-        let path = desk.path().join(FILE);
+        let path = desk.path().join(names::CLAIM);
         let opened = File::options().create(true).append(true).open(&path).expect("made");
         assert!(is_at(&opened, &path));
         std::fs::remove_file(&path).expect("removed");

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use trueup_core::{Error, Result};
 
+use super::names;
 use super::record::SetRecord;
-use super::{claim, names, record};
 use crate::project::PROJECT_FORMAT;
 
 /// How the text of a record begins.
@@ -50,13 +50,13 @@ pub(super) fn refuse_over(path: &Path, is_own: impl FnOnce(&[u8]) -> bool) -> Re
 /// without an end: nothing tells what of it that left.
 pub(super) fn in_set(folder: &Path, output: &Path, extension: &str) -> Option<PathBuf> {
     let known = SetRecord::read(folder);
-    let of_record = folder.join(record::FILE);
+    let of_record = folder.join(names::RECORD);
     if known.is_none() && of_record.exists() && !begins_as_record(&of_record) {
         return Some(of_record);
     }
     let entries = std::fs::read_dir(folder).ok()?.filter_map(|entry| Some(entry.ok()?.path()));
     let name = |path: &Path| path.file_name().and_then(|name| name.to_str()).map(str::to_owned).unwrap_or_default();
-    let is_ours = |name: &str| names::is_of_set(name) && name != claim::FILE && name != record::FILE;
+    let is_ours = |name: &str| names::is_of_set(name) && name != names::CLAIM && name != names::RECORD;
     let mut there: Vec<PathBuf> = entries.filter(|path| is_ours(&name(path)) && path.is_file()).collect();
     there.sort();
     match known {

@@ -5,8 +5,14 @@ use std::path::{Path, PathBuf};
 use trueup_io::encode::{self, OutputOptions};
 use trueup_io::source;
 
-use super::{Batch, claim, record, sets};
+use super::Batch;
 
+/// The name of the set of the photographs that lie in the folder itself.
+pub(super) const ROOT: &str = ".";
+/// The file in a set's folder that is there while a program works at it, and after one that was killed at it.
+pub(super) const CLAIM: &str = "at-work";
+/// The file in a set's folder that says what became of it.
+pub(super) const RECORD: &str = "record.json";
 /// What a set's panorama is called in its folder, without extension.
 pub(super) const PANORAMA: &str = "panorama";
 /// What its small copy is called, without extension.
@@ -44,8 +50,8 @@ pub(super) fn is_of_set(name: &str) -> bool {
     let has_stem = |stem: &str, extension: &str| {
         name.strip_suffix(extension).and_then(|rest| rest.strip_suffix('.')).is_some_and(|rest| is_numbered(rest, stem))
     };
-    name == claim::FILE
-        || name == record::FILE
+    name == CLAIM
+        || name == RECORD
         || is_panorama(&name)
         || has_stem(PANORAMA, PROJECT_EXTENSION)
         || has_stem(THUMBNAIL, THUMBNAIL_EXTENSION)
@@ -81,8 +87,8 @@ pub(super) fn panoramas_in(folder: &Path) -> Vec<PathBuf> {
 pub(super) fn place_of_a_file(set: &str, is_set: impl Fn(&str) -> bool) -> Option<&str> {
     let ends = set.match_indices('/').map(|(end, _)| end).chain([set.len()]);
     ends.map(|end| &set[..end]).find(|place| {
-        let (folder, name) = place.rsplit_once('/').unwrap_or((sets::ROOT, place));
-        let is_of_all = folder == sets::ROOT && Batch::FILES.iter().any(|file| name.eq_ignore_ascii_case(file));
+        let (folder, name) = place.rsplit_once('/').unwrap_or((ROOT, place));
+        let is_of_all = folder == ROOT && Batch::FILES.iter().any(|file| name.eq_ignore_ascii_case(file));
         is_of_all || (is_of_set(name) && is_set(folder))
     })
 }

@@ -11,9 +11,6 @@ use trueup_io::encode;
 
 use super::names;
 
-/// The record's file in the folder of a set.
-pub(super) const FILE: &str = "record.json";
-
 /// The field of [`SetRecord::made_of`] that lists the photographs.
 pub(super) const PHOTOGRAPHS: &str = "photographs";
 /// The field of a photograph in it that could not be read; others do not have it.
@@ -108,7 +105,7 @@ impl SetRecord {
 
     /// The record in a set's folder; `None` if there is none, or it is no whole one.
     pub(super) fn read(folder: &Path) -> Option<Self> {
-        serde_json::from_slice(&std::fs::read(folder.join(FILE)).ok()?).ok()
+        serde_json::from_slice(&std::fs::read(folder.join(names::RECORD)).ok()?).ok()
     }
 
     /// Keeps the record: the set is done when it is there.
@@ -118,7 +115,7 @@ impl SetRecord {
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
         let text =
             serde_json::to_vec(self).map_err(|error| Error::input("record", error, "Report this as a defect."))?;
-        encode::write_atomically(&folder.join(FILE), &text)
+        encode::write_atomically(&folder.join(names::RECORD), &text)
     }
 
     /// Takes a set's record away, before its panoramas are made anew: it would speak of the old ones.
@@ -126,7 +123,7 @@ impl SetRecord {
     /// # Errors
     /// [`Error::Io`].
     pub(super) fn forget(folder: &Path) -> Result<()> {
-        let path = folder.join(FILE);
+        let path = folder.join(names::RECORD);
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => Err(Error::io("removing", &path, error)),
             _ => Ok(()),
@@ -240,13 +237,13 @@ mod tests {
         assert_eq!(SetRecord::read(desk.path()).as_ref(), Some(&record));
         assert_eq!(record.panoramas()[0]["panorama"], "a/p.jpg");
         assert_eq!(record.panoramas()[0]["beside"]["project"], "a/p.json");
-        let text = std::fs::read(desk.path().join(FILE)).expect("readable");
-        std::fs::write(desk.path().join(FILE), &text[..text.len() / 2]).expect("written");
+        let text = std::fs::read(desk.path().join(names::RECORD)).expect("readable");
+        std::fs::write(desk.path().join(names::RECORD), &text[..text.len() / 2]).expect("written");
         assert_eq!(SetRecord::read(desk.path()), None);
         for _ in 0..2 {
             SetRecord::forget(desk.path()).expect("gone");
         }
-        assert!(!desk.path().join(FILE).exists());
+        assert!(!desk.path().join(names::RECORD).exists());
     }
 
     fn made(made_of: Value, panorama: Value) -> SetRecord {

@@ -11,7 +11,7 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::provenance::seconds_taken;
 use trueup_io::source::{self, InMemory};
 
-use super::names;
+use super::names::{self, ROOT};
 
 /// Folders within folders that are looked into: deeper ones are of no photographer's making.
 const DEEPEST: usize = 32;
@@ -19,8 +19,6 @@ const DEEPEST: usize = 32;
 const FEWEST: usize = 2;
 /// Why a name is of no use.
 const NO_UTF8: &str = "its name is no UTF-8";
-/// The name of the set in the folder itself.
-pub(super) const ROOT: &str = ".";
 
 /// Photographs that may make a panorama together.
 #[derive(Debug, Clone, PartialEq, Eq)]
