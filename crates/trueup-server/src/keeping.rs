@@ -28,20 +28,20 @@ impl Companions {
         let folder = format!("{stem}-masks");
         let mut all = Self::default();
         for (position, image) in project.images.iter().enumerate() {
-            for (number, mask) in image.masks.iter().enumerate() {
+            for (place, mask) in image.masks.iter().enumerate() {
+                let number = image.masks[..place].iter().filter(|other| other.kind == mask.kind).count() + 1;
                 let file = mask_name(stem, image, position, mask.kind, number);
                 let name = if among.is_some() { format!("{folder}/{file}") } else { file };
                 all.files.insert(PathBuf::from(&mask.path), name.clone());
                 all.renamed.insert(mask.path.clone(), name);
                 all.masks_folder = among.map(|_| folder.clone());
             }
-            if Path::new(&image.path).starts_with(dropped) {
-                let name = image.file_name().to_owned();
+            for (path, name) in image.files().filter(|(path, _)| Path::new(path).starts_with(dropped)) {
                 // One that was saved there before need not be again.
-                if among.is_some_and(|among| !is_copy(&among.join(&name), Path::new(&image.path))) {
-                    all.files.insert(PathBuf::from(&image.path), name.clone());
+                if among.is_some_and(|among| !is_copy(&among.join(name), Path::new(path))) {
+                    all.files.insert(PathBuf::from(path), name.to_owned());
                 }
-                all.renamed.insert(image.path.clone(), name);
+                all.renamed.insert(path.clone(), name.to_owned());
             }
         }
         all
@@ -94,7 +94,7 @@ impl Companions {
     }
 }
 
-/// What the copy of a mask is called: `panorama-02.jpg-use.png`.
+/// What the copy of a mask is called, which is that `number` of its kind from 1 on: `panorama-02.jpg-use.png`.
 fn mask_name(stem: &str, image: &ImageRecord, position: usize, kind: MaskKind, number: usize) -> String {
     let kind = match kind {
         MaskKind::Use => "use",

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use trueup::{
-    Error, ImageRecord, ImageStatus, MaskKind, MaskRecord, Project, RecordedPanorama, Result, RunOptions, StageContext,
+    Error, ImageRecord, ImageStatus, MaskRecord, Project, RecordedPanorama, Result, RunOptions, StageContext,
     StitchOptions, Stitcher,
 };
 
@@ -27,30 +27,35 @@ pub(crate) fn reopen(studio: &Studio, text: &str, name: &str, context: &StageCon
     };
     let (dropped_masks, listed) = masks_among(listed, &project);
     let places = Places { studio, folder: folder.as_deref(), dropped: &dropped_masks };
-    let (mut masks, mut moved) = (BTreeMap::new(), BTreeMap::new());
-    for image in &project.images {
-        let number = place(image, &listed);
-        let path = match number {
-            Some(number) => listed[number].path.display().to_string(),
-            None if image.status == ImageStatus::Used => return Err(not_there(image)),
-            // Left out then, and not here now: only its name is told.
-            None => image.file_name().to_owned(),
+    let (mut masks, mut moved, mut names) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+    for image in &mut project.images {
+        let number = place(&image.path, image.file_name(), &listed);
+        for (path, name) in image.files() {
+            match place(path, name, &listed) {
+                Some(number) => moved.insert(path.clone(), listed[number].path.display().to_string()),
+                None if image.status == ImageStatus::Used => return Err(not_there(name)),
+                // Left out then, and not here now: only its name is told.
+                None => names.insert(path.clone(), name.to_owned()),
+            };
+        }
+        let Some(number) = number else {
+            // They go with the photograph: what they name is read and copied by nobody.
+            image.masks.clear();
+            continue;
         };
-        moved.insert(image.path.clone(), path);
         let mut painted = PaintedMasks::default();
         for record in &image.masks {
             let path = places.mask(record)?;
             moved.insert(record.path.clone(), path.display().to_string());
-            match record.kind {
-                MaskKind::Use => painted.used = Some(path),
-                MaskKind::Keep => painted.kept = Some(path),
-            }
+            painted.add(record.kind, path);
         }
         if !image.masks.is_empty() {
-            masks.extend(number.map(|number| (number, painted)));
+            masks.insert(number, painted);
         }
     }
-    project.rename_files(&moved);
+    // What is read goes by where it was found, whatever else is recorded of its path.
+    names.extend(moved);
+    project.rename_files(&names);
     let options = project.options.clone();
     let stitcher = Stitcher::new(&options, context);
     let nowhere = studio.desk.path().join("none");
@@ -66,19 +71,19 @@ pub(crate) fn reopen(studio: &Studio, text: &str, name: &str, context: &StageCon
     keep(studio, context, Kept { alignment, options, wishes })
 }
 
-/// The photograph of the session that a record means: the file it names, or the only one of its name.
-fn place(image: &ImageRecord, listed: &[Listed]) -> Option<usize> {
-    let recorded = Path::new(&image.path);
+/// The photograph of the session that a record means: the file it names, or the only one of that `name`.
+fn place(recorded: &str, name: &str, listed: &[Listed]) -> Option<usize> {
+    let recorded = Path::new(recorded);
     let same = listed.iter().position(|one| one.path == recorded);
     same.or_else(|| {
-        let mut named = (0..listed.len()).filter(|&number| listed[number].name() == image.file_name());
+        let mut named = (0..listed.len()).filter(|&number| listed[number].name() == name);
         named.next().filter(|_| named.next().is_none())
     })
 }
 
-fn not_there(image: &ImageRecord) -> Error {
+fn not_there(name: &str) -> Error {
     let hint = "Begin in the folder that holds its photographs, or drop them on the page first.";
-    Error::input(image.file_name(), "this photograph of the project is not here", hint)
+    Error::input(name, "this photograph of the project is not here", hint)
 }
 
 /// The dropped pictures that the project names as masks and not as photographs, and all else.
@@ -88,7 +93,7 @@ fn masks_among(listed: Vec<Listed>, project: &Project) -> (Vec<Listed>, Vec<List
         let masks = project.images.iter().flat_map(|image| &image.masks);
         one.dropped
             && masks.into_iter().any(|mask| mask.file_name() == name)
-            && project.images.iter().all(|image| image.file_name() != name)
+            && project.images.iter().flat_map(ImageRecord::files).all(|(_, photograph)| photograph != name)
     };
     listed.into_iter().partition(is_mask)
 }

@@ -139,8 +139,8 @@ fn told_photographs(state: &State) -> Vec<ToldPhotograph> {
             name: listed.name(),
             dropped: listed.dropped,
             left_out: wishes.left_out.contains(&number),
-            used_mask: mask(painted.and_then(|painted| painted.used.as_ref())),
-            kept_mask: mask(painted.and_then(|painted| painted.kept.as_ref())),
+            used_mask: mask(painted.and_then(|painted| painted.used.last())),
+            kept_mask: mask(painted.and_then(|painted| painted.kept.last())),
             verdict: record.map(|record| ToldVerdict {
                 used: record.status == ImageStatus::Used,
                 reason: record.reason.clone(),

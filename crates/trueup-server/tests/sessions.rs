@@ -432,6 +432,83 @@ fn dropped_photographs_outlive_the_program() {
     assert!(unchunked(&other.get(&format!("/api/exports/{}/0", again["number"])).body) == picture);
 }
 
+/// Other exposures of a photograph, as a project records them, which lie on it as they are.
+fn exposures(paths: &[&str]) -> Value {
+    let same = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    paths.iter().map(|path| json!({ "path": path, "reference_from_member": same })).collect()
+}
+
+/// Exposures of brackets are found as the photographs are that they belong to, and go with a project as these do.
+#[test]
+fn exposures_of_brackets_go_with_their_photographs() {
+    let (source, opened) = (room(), tempfile::tempdir().expect("a folder"));
+    let maker = Server::of(source.path());
+    assert_eq!(maker.post("/api/wishes", SMALL).status, 204);
+    stitched(&maker);
+    let mut project = maker.get("/api/project").json();
+    drop(maker);
+    // As it was recorded in another folder.
+    project["images"][2]["stack"] = exposures(&["./brighter.jpg"]);
+    let project = project.to_string().replace(&format!("{}/", source.path().display()), "./");
+    let server = Server::of(opened.path());
+    let named: Vec<(String, u8)> = (0..5).map(|number| (format!("0{number}.jpg"), number)).collect();
+    for (name, number) in named.iter().cloned().chain([("brighter.jpg".to_owned(), 2)]) {
+        let bytes = std::fs::read(source.path().join(format!("0{number}.jpg"))).expect("a photograph");
+        assert_eq!(server.with_body("PUT", &format!("/api/photographs?name={name}"), &bytes).status, 201);
+    }
+    assert_eq!(server.with_body("PUT", "/api/project", project.as_bytes()).status, 202);
+    let told = server.settled();
+    assert_eq!(told["trouble"], Value::Null, "{told}");
+    let saved = export(&server, &json!({ "name": "pano.png", "beside": ["project"], "into_folder": true }));
+    assert!(names(&saved).contains(&"brighter.jpg"), "{saved}");
+    drop(server);
+    let text = std::fs::read_to_string(opened.path().join("pano.json")).expect("a project");
+    let recorded = Project::from_json(&text, "pano.json").expect("a project");
+    assert_eq!(recorded.images[2].stack[0].path, "brighter.jpg");
+    let elsewhere = tempfile::tempdir().expect("a folder");
+    let picture = std::fs::read(opened.path().join("pano.png")).expect("a panorama");
+    assert!(composed(&opened.path().join("pano.json"), elsewhere.path()) == picture, "nothing is missing");
+}
+
+/// Two masks of one kind count together, in whatever is stitched and saved again; of a photograph that is gone, nothing is asked for.
+#[test]
+fn all_masks_of_a_project_are_kept() {
+    let (desk, elsewhere) = (room(), tempfile::tempdir().expect("a folder"));
+    let mask = mask(&desk.path().join("02.jpg"), elsewhere.path());
+    let server = Server::of(desk.path());
+    assert_eq!(server.post("/api/wishes", SMALL).status, 204);
+    stitched(&server);
+    let mut project = server.get("/api/project").json();
+    std::fs::create_dir(desk.path().join("masks")).expect("a folder");
+    for name in ["one.png", "other.png"] {
+        std::fs::write(desk.path().join("masks").join(name), &mask).expect("written");
+    }
+    project["images"][1]["masks"] =
+        json!([{ "path": "masks/one.png", "kind": "use" }, { "path": "masks/other.png", "kind": "use" }]);
+    let mut gone = project["images"][0].clone();
+    for (field, value) in [
+        ("path", json!("gone.jpg")),
+        ("status", json!("left_out")),
+        ("masks", json!([{ "path": "gone.png", "kind": "use" }])),
+    ] {
+        gone[field] = value;
+    }
+    project["images"].as_array_mut().expect("a list").push(gone);
+    assert_eq!(server.with_body("PUT", "/api/project", project.to_string().as_bytes()).status, 202);
+    let told = server.settled();
+    assert_eq!(told["trouble"], Value::Null, "{told}");
+    stitched(&server);
+    let masks = server.get("/api/project").json()["images"][1]["masks"].as_array().map(Vec::len);
+    assert_eq!(masks, Some(2), "stitched again");
+    let saved = export(&server, &json!({ "name": "pano.png", "beside": ["project"], "into_folder": true }));
+    let expected = ["pano.png", "pano.json", "pano-masks/pano-01.jpg-use.png", "pano-masks/pano-01.jpg-use-2.png"];
+    let mut sorted = names(&saved);
+    sorted.sort();
+    let mut expected = expected.to_vec();
+    expected.sort();
+    assert_eq!(sorted, expected);
+}
+
 /// A project that names files elsewhere reads none of them.
 #[test]
 fn a_project_reads_only_what_is_here() {
@@ -454,6 +531,19 @@ fn a_project_reads_only_what_is_here() {
     assert!(told.contains("secret.jpg: this photograph of the project is not here"), "{told}");
     let told = told_of(&|project| project["images"][2]["masks"] = json!([{ "path": elsewhere, "kind": "use" }]));
     assert!(told.contains("this mask of the project is not here"), "{told}");
+    let told = told_of(&|project| project["images"][2]["stack"] = exposures(&[&elsewhere]));
+    assert!(told.contains("secret.jpg: this photograph of the project is not here"), "{told}");
+    // Nor does one that was left out, and is gone with its masks.
+    let told = told_of(&|project| {
+        let mut gone = project["images"][0].clone();
+        gone["path"] = json!("gone.jpg");
+        gone["status"] = json!("left_out");
+        gone["stack"] = exposures(&[&elsewhere]);
+        gone["masks"] = json!([{ "path": elsewhere, "kind": "use" }]);
+        project["images"].as_array_mut().expect("a list").push(gone);
+    });
+    assert_eq!(told, "");
+    assert!(!server.get("/api/project").text().contains(&elsewhere), "its paths are not kept");
     let told = told_of(&|project| project["options"]["resources"]["scratch"] = json!(secret.path().join("none")));
     assert_eq!(told, "", "it is not heeded");
     let told = told_of(&|project| project["images"][2]["path"] = json!("/elsewhere/02.jpg"));

@@ -165,10 +165,7 @@ pub(crate) async fn mask(
 ) -> Result<Response, Denial> {
     let kind = kind_of(&kind)?;
     let painted = studio.state().history.now().masks.get(&number).cloned().unwrap_or_default();
-    let file = match kind {
-        MaskKind::Use => painted.used,
-        MaskKind::Keep => painted.kept,
-    };
+    let file = painted.of(kind).last().cloned();
     let file = file.filter(|file| studio.may_read(file)).ok_or_else(|| Denial::missing("mask"))?;
     let bytes = tokio::fs::read(&file).await.map_err(Denial::failure)?;
     Ok(([(header::CONTENT_TYPE, "image/png")], bytes).into_response())
@@ -189,11 +186,7 @@ pub(crate) async fn paint(
     };
     studio.change(|state| {
         let mut wishes = state.history.now().clone();
-        let painted = wishes.masks.entry(number).or_default();
-        match kind {
-            MaskKind::Use => painted.used = file,
-            MaskKind::Keep => painted.kept = file,
-        }
+        wishes.masks.entry(number).or_default().paint(kind, file);
         wishes.masks.retain(|_, painted| *painted != Default::default());
         state.history.go_on(wishes);
     });

@@ -8,13 +8,43 @@ use trueup::{MaskFile, MaskKind, OptionDescription, StitchOptions, Tier};
 
 use super::listed::Listed;
 
-/// Masks that were painted on one photograph.
+/// Masks of one photograph. The page shows the last of a kind, and paints on that; those of a project that was opened may be more, which count
+/// together.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct PaintedMasks {
     /// What is black in it is ignored.
-    pub used: Option<PathBuf>,
+    pub used: Vec<PathBuf>,
     /// What is white in it is kept.
-    pub kept: Option<PathBuf>,
+    pub kept: Vec<PathBuf>,
+}
+
+impl PaintedMasks {
+    /// Those of a kind.
+    pub(crate) fn of(&self, kind: MaskKind) -> &[PathBuf] {
+        match kind {
+            MaskKind::Use => &self.used,
+            MaskKind::Keep => &self.kept,
+        }
+    }
+
+    /// One more of its kind.
+    pub(crate) fn add(&mut self, kind: MaskKind, file: PathBuf) {
+        self.all_of(kind).push(file);
+    }
+
+    /// Puts `file` in the place of the last of its kind; without, takes that away.
+    pub(crate) fn paint(&mut self, kind: MaskKind, file: Option<PathBuf>) {
+        let masks = self.all_of(kind);
+        masks.pop();
+        masks.extend(file);
+    }
+
+    fn all_of(&mut self, kind: MaskKind) -> &mut Vec<PathBuf> {
+        match kind {
+            MaskKind::Use => &mut self.used,
+            MaskKind::Keep => &mut self.kept,
+        }
+    }
 }
 
 /// All that a person can wish, to be undone as one. Photographs go by their numbers in the session.
@@ -52,10 +82,9 @@ impl Wishes {
         let files =
             self.masks.iter().filter(|(number, _)| !self.left_out.contains(number)).flat_map(|(&number, painted)| {
                 let photograph = photographs.get(number).map(|listed| listed.path.display().to_string());
-                let both = [(painted.used.clone(), MaskKind::Use), (painted.kept.clone(), MaskKind::Keep)];
-                both.into_iter().filter_map(move |(file, kind)| {
-                    Some(MaskFile { photograph: photograph.clone()?, file: file?, kind })
-                })
+                let of_kind = |kind| painted.of(kind).iter().map(move |file| (file.clone(), kind));
+                let both = of_kind(MaskKind::Use).chain(of_kind(MaskKind::Keep));
+                both.filter_map(move |(file, kind)| Some(MaskFile { photograph: photograph.clone()?, file, kind }))
             });
         files.collect()
     }

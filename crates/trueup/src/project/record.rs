@@ -407,6 +407,19 @@ impl ImageRecord {
     pub fn file_name(&self) -> &str {
         file_name(&self.path)
     }
+
+    /// The recorded path and the name of every file that it is made of: its own, and the other exposures of its stack.
+    pub fn files(&self) -> impl Iterator<Item = (&String, &str)> {
+        let members = self.stack.iter().map(|member| (&member.path, member.file_name()));
+        std::iter::once((&self.path, self.file_name())).chain(members)
+    }
+}
+
+impl StackMemberRecord {
+    /// The file's name without folders; paths written on another system are understood.
+    pub fn file_name(&self) -> &str {
+        file_name(&self.path)
+    }
 }
 
 impl Project {

@@ -7,7 +7,6 @@ use trueup_core::source::{SourceImage, StackMember};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::{self, InMemory, RejectedSource, SourceOptions};
 
-use super::paths;
 use super::read::{as_recorded, find_photograph};
 use super::record::{ImageRecord, StackMemberRecord};
 use crate::report::several::several;
@@ -116,7 +115,7 @@ pub(crate) fn other_photographs(
 /// not there: the photograph then stands for itself.
 fn replaced_stack(record: &ImageRecord, others: &[SourceImage]) -> Vec<StackMember> {
     let replaced = |member: &StackMemberRecord| {
-        let name = paths::file_name(&member.path);
+        let name = member.file_name();
         let named = |other: &SourceImage| {
             let file = file_name(&other.path);
             let is_named = file == name || stem(&file) == stem(name);
