@@ -1,7 +1,7 @@
 //! From wishes to panoramas: stitched, drawn small, cut into tiles, written to files. All of it is the library's work; what
 //! is said here is what of it is asked for.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
 
 use serde::Serialize;
@@ -53,11 +53,12 @@ pub(crate) struct Kept {
 pub(crate) fn keep(studio: &Studio, context: &StageContext, kept: Kept) -> Result<()> {
     context.check_cancelled()?;
     let Kept { alignment, options, wishes } = kept;
-    studio.change(|state| {
+    let older = studio.change(|state| {
         let number = state.number();
         state.stitched = Some(Stitched { number, alignment: Arc::new(alignment), options, wishes });
-        state.tiles = None;
+        state.tiles.take()
     });
+    remove_folders(older.map(|tiles| tiles.folder));
     Ok(())
 }
 
@@ -196,10 +197,7 @@ pub(crate) fn cut_tiles(studio: &Studio, context: &StageContext) -> Result<()> {
     let stitched = order.stitched.number;
     let tiles = Tiles { number, folder, underlay, stitched, wishes: order.wishes };
     let older = studio.change(|state| state.tiles.replace(tiles));
-    if let Some(older) = older {
-        // What cannot be removed goes with the desk.
-        drop(std::fs::remove_dir_all(older.folder));
-    }
+    remove_folders(older.map(|tiles| tiles.folder));
     Ok(())
 }
 
@@ -271,9 +269,7 @@ pub(crate) fn export(studio: &Studio, ordered: &ExportOrder, context: &StageCont
         let too_many = state.exports.len().saturating_sub(crate::limits::MAX_EXPORTS);
         state.exports.drain(..too_many).collect::<Vec<_>>()
     });
-    for folder in forgotten.into_iter().filter_map(|export| export.folder) {
-        drop(std::fs::remove_dir_all(folder));
-    }
+    remove_folders(forgotten.into_iter().filter_map(|export| export.folder));
     Ok(())
 }
 
@@ -288,6 +284,13 @@ pub(crate) fn record(studio: &Studio) -> Result<String> {
         let stitcher = Stitcher::new(&order.options, &context);
         order.alignment(&stitcher)?.project.to_json()
     })
+}
+
+/// Removes folders of what is no longer shown. What cannot be removed goes with the desk.
+pub(crate) fn remove_folders(folders: impl IntoIterator<Item = PathBuf>) {
+    for folder in folders {
+        drop(std::fs::remove_dir_all(folder));
+    }
 }
 
 fn make_folder(folder: &Path) -> Result<()> {

@@ -17,6 +17,7 @@ use crate::folder::plain_name;
 use crate::limits::{
     MAX_DROPPED_BYTES, MAX_MASK_BYTES, MAX_PHOTOGRAPH_BYTES, MAX_PHOTOGRAPHS, PAINTED_PIXELS, THUMBNAIL_PIXELS,
 };
+use crate::making::remove_folders;
 use crate::studio::{Listed, State as Now, Studio};
 
 /// A folder inside the one that was opened when the program began.
@@ -33,14 +34,19 @@ pub(crate) async fn open(State(studio): State<Arc<Studio>>, body: Body) -> Resul
     let none = || Denial::missing("folder");
     let opened = studio.root.as_ref().and_then(|root| root.inside(&folder).ok()).ok_or_else(none)?;
     let photographs = opened.photographs().into_iter().map(|path| Listed { path, dropped: false }).collect();
-    studio.change(|state| {
+    let forgotten = studio.change(|state| {
         if state.work.is_some() {
             return Err(Denial::not_now("something is being done", "Wait for it, or stop it."));
         }
         let (last_number, dropped_bytes) = (state.last_number, state.dropped_bytes);
-        *state = Now { folder: Some(opened), photographs, last_number, dropped_bytes, ..Now::default() };
-        Ok(())
+        let opened = Now { folder: Some(opened), photographs, last_number, dropped_bytes, ..Now::default() };
+        Ok(std::mem::replace(state, opened))
     })?;
+    // Nothing leads to what was made of the other folder any more.
+    let tiles = forgotten.tiles.map(|tiles| tiles.folder);
+    let exports = forgotten.exports.into_iter().filter_map(|export| export.folder);
+    let folders: Vec<PathBuf> = tiles.into_iter().chain(exports).collect();
+    tokio::task::spawn_blocking(|| remove_folders(folders)).await.map_err(Denial::failure)?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -205,4 +211,45 @@ async fn written(studio: &Studio, bytes: &[u8]) -> Result<PathBuf, Denial> {
     let place = studio.masks().join(format!("{number}.png"));
     tokio::fs::write(&place, bytes).await.map_err(Denial::failure)?;
     Ok(place)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::folder::Folder;
+    use crate::making::{ExportOrder, cut_tiles, export, stitch};
+
+    /// Folders in a folder.
+    fn count(folder: &std::path::Path) -> usize {
+        let entries = std::fs::read_dir(folder).expect("readable");
+        entries.filter(|entry| entry.as_ref().expect("readable").path().is_dir()).count()
+    }
+
+    /// Tiles and files to fetch that nothing leads to any more are removed: when another panorama is stitched, and when another folder is opened.
+    #[test]
+    fn what_is_no_longer_shown_is_removed() {
+        let desk = tempfile::tempdir().expect("a folder");
+        std::fs::create_dir(desk.path().join("inside")).expect("a folder");
+        let room = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room"));
+        for name in ["00.jpg", "01.jpg"] {
+            std::fs::copy(room.join(name), desk.path().join(name)).expect("copied");
+        }
+        let studio = Arc::new(Studio::new(Some(Folder::open(desk.path()).expect("a folder"))).expect("a studio"));
+        studio.change(|state| state.base.set("canvas.scale=0.1").expect("an option"));
+        let context = StageContext::default();
+        let (pictures, exports) = (studio.pictures(), studio.exports());
+        stitch(&studio, &context).expect("stitched");
+        cut_tiles(&studio, &context).expect("cut");
+        assert_eq!(count(&pictures), 1);
+        stitch(&studio, &context).expect("stitched");
+        assert_eq!(count(&pictures), 0, "they were of the panorama before");
+        cut_tiles(&studio, &context).expect("cut");
+        let ordered = ExportOrder { name: "pano.png".to_owned(), beside: Vec::new(), into_folder: false };
+        export(&studio, &ordered, &context).expect("written");
+        assert_eq!((count(&pictures), count(&exports)), (1, 1));
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+        let opened = open(State(studio.clone()), Body::from(r#"{"folder":"inside"}"#));
+        assert!(runtime.block_on(opened).is_ok());
+        assert_eq!((count(&pictures), count(&exports)), (0, 0), "they were of the folder before");
+    }
 }
