@@ -1,6 +1,6 @@
 //! A stitch graph written by hand.
 //!
-//! Two notations are read, line by line; `#` starts a comment:
+//! Two notations are read, line by line; `#` at the start of a line, or behind a space, starts a comment, unless the names of photographs go on there:
 //!
 //! * `NAME -- NAME` or `INDEX -- INDEX`: the two photographs overlap. Names are file names, with as many of the folders they lie in as tell them from
 //!   others; indices count from 0 in the order in which the photographs were given.
@@ -11,6 +11,9 @@
 use std::path::Path;
 
 use trueup_core::{Error, Result};
+
+/// What starts a comment.
+const COMMENT: char = '#';
 
 /// What a graph file says.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -33,15 +36,12 @@ pub fn parse_graph_file(text: &str, photographs: &[&Path], file: &str) -> Result
     // Editors of some systems begin a text with a mark of its byte order, which is no part of the first name.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     for (number, line) in text.lines().enumerate() {
-        let line = line.split('#').next().unwrap_or_default().trim();
-        if line.is_empty() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with(COMMENT) {
             continue;
         }
-        let parsed = match line.strip_prefix('{').and_then(|rest| rest.strip_suffix('}')) {
-            Some(fields) => keyed_line(fields, photographs.len(), &mut graph),
-            None => pair_line(line, photographs).map(|edge| graph.edges.push(edge)),
-        };
-        parsed.map_err(|reason| {
+        let read = with_and_without_comment(line).map(|line| read_line(line, photographs, &mut graph));
+        first_ok(read).unwrap_or(Ok(())).map_err(|reason| {
             Error::input(
                 format!("{file}, line {}", number + 1),
                 reason,
@@ -57,9 +57,42 @@ pub fn parse_graph_file(text: &str, photographs: &[&Path], file: &str) -> Result
     Ok(graph)
 }
 
+/// A line as it stands, and cut before each of its comments, the shortest first: names may have the mark of a comment, too.
+fn with_and_without_comment(line: &str) -> impl Iterator<Item = &str> {
+    let is_comment = move |&(at, _): &(usize, &str)| line[..at].ends_with(char::is_whitespace);
+    let cut = line.match_indices(COMMENT).filter(is_comment).map(move |(at, _)| line[..at].trim_end());
+    cut.chain(std::iter::once(line))
+}
+
+/// The first that is no error, or else the first error; `None` of nothing.
+fn first_ok<T, E>(results: impl Iterator<Item = std::result::Result<T, E>>) -> Option<std::result::Result<T, E>> {
+    let mut first_error = None;
+    for result in results {
+        match result {
+            Ok(_) => return Some(result),
+            Err(_) => first_error = first_error.or(Some(result)),
+        }
+    }
+    first_error
+}
+
+fn read_line(line: &str, photographs: &[&Path], graph: &mut GraphFile) -> std::result::Result<(), String> {
+    match line.strip_prefix('{').and_then(|rest| rest.strip_suffix('}')) {
+        Some(fields) => keyed_line(fields, photographs.len(), graph),
+        None => pair_line(line, photographs).map(|edge| graph.edges.push(edge)),
+    }
+}
+
+/// The pair of a line. Names may have the mark between the two in them as well: it is where both sides name photographs, most likely where spaces
+/// are about it.
 fn pair_line(line: &str, photographs: &[&Path]) -> std::result::Result<(usize, usize), String> {
-    let (first, second) = line.split_once("--").ok_or_else(|| format!("\"{line}\" is not a pair"))?;
-    ordered(photograph(first, photographs)?, photograph(second, photographs)?)
+    let marks = |mark: &'static str| {
+        let starts = line.char_indices().filter(move |&(at, _)| line[at..].starts_with(mark));
+        starts.map(move |(at, _)| (&line[..at], &line[at + mark.len()..]))
+    };
+    let pairs = marks(" -- ").chain(marks("--"));
+    let pairs = pairs.map(|(one, other)| ordered(photograph(one, photographs)?, photograph(other, photographs)?));
+    first_ok(pairs).unwrap_or_else(|| Err(format!("\"{line}\" is not a pair")))
 }
 
 fn keyed_line(fields: &str, count: usize, graph: &mut GraphFile) -> std::result::Result<(), String> {
@@ -127,6 +160,20 @@ mod tests {
     fn names_with_spaces_and_indices_are_read() {
         let graph = parse_graph_file("# two pairs\nc.jpg -- a 1.jpg\n0 -- 1 # the first\n\n", &names(), "g.txt");
         assert_eq!(graph.expect("valid").edges, [(0, 1), (0, 2)]);
+    }
+
+    /// Marks of comments and of pairs are parts of names as well.
+    #[test]
+    fn names_with_marks_in_them_are_read() {
+        let paths = ["IMG#1.jpg", "a--b.jpg", "day 1 -- noon.jpg", "no #3.jpg", "c-.jpg"].map(Path::new);
+        let edges = |text: &str| parse_graph_file(text, &paths, "g.txt").map(|graph| graph.edges);
+        assert_eq!(edges("IMG#1.jpg -- a--b.jpg # both").expect("valid"), [(0, 1)]);
+        assert_eq!(edges("a--b.jpg--IMG#1.jpg").expect("valid"), [(0, 1)]);
+        assert_eq!(edges("a--b.jpg -- day 1 -- noon.jpg").expect("valid"), [(1, 2)]);
+        assert_eq!(edges("day 1 -- noon.jpg -- no #3.jpg # 0 -- 1").expect("valid"), [(2, 3)]);
+        assert_eq!(edges("c-.jpg--0\n#0 -- 1\n").expect("valid"), [(0, 4)]);
+        let message = edges("IMG#1.jpg -- IMG#2.jpg # none").expect_err("unknown").to_string();
+        assert!(message.contains("line 1: \"IMG#2.jpg\" is none of the 5 photographs given"), "{message}");
     }
 
     /// By its name alone, with its folder or by its whole path; a name of several photographs is none of one.
