@@ -19,8 +19,8 @@ const MOST_LOOKED_AT: u64 = 4096;
 pub(super) struct Claim {
     path: PathBuf,
     file: File,
-    /// How many times work at the set was begun before, and never came to an end.
-    pub(super) unended: u64,
+    /// How many times work at the set was begun before, by programs that were killed at it or, where the lock does not hold, may be at it.
+    begun: u64,
     /// Whether the lock holds: file systems that know none let every program take every set.
     pub(super) is_locked: bool,
 }
@@ -46,20 +46,31 @@ impl Claim {
         if !is_at(&file, &path) {
             return Ok(None);
         }
-        let mut begun = Vec::new();
-        (&file).take(MOST_LOOKED_AT).read_to_end(&mut begun).map_err(wrong)?;
-        if begun.iter().any(|&byte| byte != BEGINNING) {
+        let mut beginnings = Vec::new();
+        (&file).take(MOST_LOOKED_AT).read_to_end(&mut beginnings).map_err(wrong)?;
+        if beginnings.iter().any(|&byte| byte != BEGINNING) {
             return Err(foreign::refusal(&path));
         }
-        let unended = file.metadata().map_err(wrong)?.len();
+        let begun = file.metadata().map_err(wrong)?.len();
         if let Err(error) = file.write_all(&[BEGINNING]) {
             // Nothing is to tell of work that never began.
-            if is_locked && unended == 0 {
+            if is_locked && begun == 0 {
                 drop(std::fs::remove_file(&path));
             }
             return Err(wrong(error));
         }
-        Ok(Some(Self { path, file, unended, is_locked }))
+        Ok(Some(Self { path, file, begun, is_locked }))
+    }
+
+    /// How many times work at the set was begun before, and never came to an end. Where the lock does not hold, nothing tells programs that were
+    /// killed from those that are at it: none is counted.
+    pub(super) fn unended(&self) -> u64 {
+        if self.is_locked { self.begun } else { 0 }
+    }
+
+    /// Whether nobody has begun with the set, so that nothing half made of it can be there.
+    pub(super) fn is_first(&self) -> bool {
+        self.begun == 0
     }
 
     /// Whether work at the set of this folder was begun and did not end, or has not yet.
@@ -102,17 +113,30 @@ mod tests {
         let folder = desk.path().join("a/b");
         assert!(!Claim::is_begun(&folder));
         let first = Claim::take(&folder).expect("possible").expect("nobody has it");
-        assert_eq!((first.unended, first.is_locked), (0, true));
+        assert_eq!((first.unended(), first.is_locked, first.is_first()), (0, true, true));
         assert!(Claim::is_begun(&folder));
         assert!(Claim::take(&folder).expect("possible").is_none(), "it is taken");
         // As when the program is killed: the lock goes, the file stays.
         drop(first);
         assert!(Claim::is_begun(&folder));
         let second = Claim::take(&folder).expect("possible").expect("nobody has it");
-        assert_eq!(second.unended, 1);
+        assert_eq!((second.unended(), second.is_first()), (1, false));
         second.release();
         assert!(!Claim::is_begun(&folder));
-        assert_eq!(Claim::take(&folder).expect("possible").expect("nobody has it").unended, 0);
+        assert_eq!(Claim::take(&folder).expect("possible").expect("nobody has it").unended(), 0);
+    }
+
+    /// Without locks, all tasks of a cluster take a set at once: it does not kill them.
+    #[test]
+    fn where_nothing_is_locked_programs_at_work_are_not_counted_as_killed() {
+        let desk = tempfile::tempdir().expect("a folder");
+        for _ in 0..7 {
+            drop(Claim::take(desk.path()).expect("possible").expect("nobody has it"));
+        }
+        let locked = Claim::take(desk.path()).expect("possible").expect("nobody has it");
+        assert_eq!((locked.unended(), locked.is_first()), (7, false));
+        let unlocked = Claim { is_locked: false, ..locked };
+        assert_eq!((unlocked.unended(), unlocked.is_first()), (0, false));
     }
 
     /// A program opens the file, another takes it away when it is done, a third makes it anew: the first holds the lock of a

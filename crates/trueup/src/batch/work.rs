@@ -147,9 +147,10 @@ impl<'a> Work<'a> {
         if !claim.is_locked && !self.told_of_locks.swap(true, Ordering::Relaxed) {
             context.report(without_locks(&self.batch.job.output));
         }
-        let is_new = claim.unended == 0;
+        // What others have half made is theirs, be they killed or at it.
+        let is_first = claim.is_first();
         if let Some(file) =
-            foreign::in_set(&folder, &self.batch.job.output, &self.batch.job.extension).filter(|_| is_new)
+            foreign::in_set(&folder, &self.batch.job.output, &self.batch.job.extension).filter(|_| is_first)
         {
             claim.release();
             return Err(foreign::refusal(&file));
@@ -232,8 +233,8 @@ impl<'a> Work<'a> {
         if set.is_alone() {
             return Ok(SetOutcome::Alone);
         }
-        if claim.unended >= MOST_UNENDED {
-            return Ok(deadly(claim.unended));
+        if claim.unended() >= MOST_UNENDED {
+            return Ok(deadly(claim.unended()));
         }
         // A defect that one set finds is not to cost the others.
         match catch_unwind(AssertUnwindSafe(|| self.stitch(set, folder, context))) {
@@ -248,7 +249,7 @@ impl<'a> Work<'a> {
     fn clear_parts(&self, folder: &Path, claim: &Claim) {
         if folder != self.batch.job.output {
             encode::clear_parts(folder, Duration::ZERO);
-        } else if claim.unended > 0 {
+        } else if claim.unended() > 0 {
             // In the folder of the batch itself, other programs write what they sum up: what is theirs is marked soon.
             std::thread::sleep(MARKED_WITHIN);
             encode::clear_parts(folder, MARKED_WITHIN);
