@@ -89,11 +89,13 @@ fn named(raw: BTreeSet<&PathBuf>) -> Vec<(&PathBuf, String)> {
     let mut taken = BTreeSet::new();
     let mut name = |(number, path): (usize, &PathBuf)| {
         let own = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        // Names that differ by their case alone are one on some disks.
-        match taken.insert(own.to_lowercase()) {
-            true => format!("{own}{DEVELOPED_END}"),
-            false => format!("{}-{own}{DEVELOPED_END}", number + 1),
+        let (mut name, mut prefix) = (own.clone(), number + 1);
+        // Names that differ by their case alone are one on some disks; what one gets in place of its own may be another's.
+        while !taken.insert(name.to_lowercase()) {
+            name = format!("{prefix}-{own}");
+            prefix += 1;
         }
+        format!("{name}{DEVELOPED_END}")
     };
     raw.into_iter().enumerate().map(|one| (one.1, name(one))).collect()
 }
@@ -107,5 +109,12 @@ mod tests {
         let raw = ["a/1.nef", "b/1.NEF", "b/2.nef"].map(PathBuf::from);
         let names: Vec<String> = named(raw.iter().collect()).into_iter().map(|(_, name)| name).collect();
         assert_eq!(names, ["1.nef.tif", "2-1.NEF.tif", "2.nef.tif"]);
+    }
+
+    #[test]
+    fn a_name_that_was_given_is_nobody_elses() {
+        let raw = ["a/1.nef", "b/1.nef", "c/2-1.nef"].map(PathBuf::from);
+        let names: Vec<String> = named(raw.iter().collect()).into_iter().map(|(_, name)| name).collect();
+        assert_eq!(names, ["1.nef.tif", "2-1.nef.tif", "3-2-1.nef.tif"]);
     }
 }
