@@ -92,11 +92,14 @@ pub(crate) fn masks(args: &MaskArgs) -> Result<Vec<MaskFile>, Failure> {
 }
 
 fn mask(flag: &str, typed: &str, kind: MaskKind) -> Result<MaskFile, Failure> {
-    match typed.split_once('=') {
-        Some((photograph, file)) if !photograph.is_empty() && !file.is_empty() => {
-            Ok(MaskFile { photograph: photograph.to_owned(), file: file.into(), kind })
-        }
-        _ => {
+    let splits = || {
+        let all = typed.match_indices('=').map(|(at, mark)| (&typed[..at], &typed[at + mark.len()..]));
+        all.filter(|(photograph, file)| !photograph.is_empty() && !file.is_empty())
+    };
+    // Names may have the mark in them as well: it parts the two where a file lies behind it.
+    match splits().find(|(_, file)| Path::new(file).is_file()).or_else(|| splits().next()) {
+        Some((photograph, file)) => Ok(MaskFile { photograph: photograph.to_owned(), file: file.into(), kind }),
+        None => {
             let message = format!("{flag} {typed}: it is not of the form NAME=FILE");
             Err(Failure::usage(message, "Write the photograph's name, \"=\", and the file of its mask."))
         }
@@ -118,4 +121,30 @@ pub(crate) fn check_files<'a>(
 /// The configuration as a file that is read, if there is one.
 pub(crate) fn configuration(tuning: &TuningArgs) -> impl Iterator<Item = (&Path, ReadFile)> {
     tuning.config.iter().map(|path| (path.as_path(), ReadFile::Configuration))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_photographs_and_masks_may_have_the_mark_between_them() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let place = |name: &str| desk.path().join(name).display().to_string();
+        for name in ["plain.png", "x=1.png"] {
+            std::fs::write(place(name), "").expect("written");
+        }
+        let parted = |typed: &str| {
+            let mask = mask("--mask", typed, MaskKind::Use).ok()?;
+            Some((mask.photograph, mask.file.display().to_string()))
+        };
+        for photograph in ["a.jpg", "a=b.jpg", "a=b=c.jpg"] {
+            for file in ["plain.png", "x=1.png"].map(place) {
+                assert_eq!(parted(&format!("{photograph}={file}")), Some((photograph.to_owned(), file)));
+            }
+        }
+        // What is not there is told as it was typed first.
+        assert_eq!(parted("a.jpg=b=c.png"), Some(("a.jpg".to_owned(), "b=c.png".to_owned())));
+        assert!(["a.jpg", "a.jpg=", "=b.png", "=", ""].iter().all(|typed| parted(typed).is_none()));
+    }
 }
