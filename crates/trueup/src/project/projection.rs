@@ -12,6 +12,12 @@ use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 /// tripod stands.
 pub(crate) const WHOLE_SPHERE: f64 = 0.75;
 
+/// What lies farther away than this, in panorama pixels, has no place any more: no file format is as wide.
+pub(crate) const FARTHEST_PX: f64 = 4_294_967_296.0;
+
+/// Least scale that is recorded, canvas pixels per radian: a whole turn on less than a pixel is no panorama.
+const LEAST_PX_PER_RADIAN: f64 = 1e-3;
+
 /// How the panorama is drawn from directions. A direction of the level world (x right, y down, z forward) that the rotations
 /// `yaw`, `pitch` and `roll` turn into the viewer's lies at `(plane - origin) * px_per_radian` on the canvas, where `plane` is
 /// its place in the projection.
@@ -93,6 +99,15 @@ impl ProjectionRecord {
             _ => return None,
         };
         Some(SphericalFrame { projection, full_width, full_height, left, top, middle_yaw: self.yaw_deg.to_radians() })
+    }
+
+    /// Whether it can have been recorded: a scale above 0, and a middle within the reach of any canvas.
+    pub(crate) fn is_sound(&self) -> bool {
+        let turns = [self.yaw_deg, self.pitch_deg, self.roll_deg, self.panini_distance];
+        let is_near = |at: &f64| (at * self.px_per_radian).abs() <= FARTHEST_PX;
+        (LEAST_PX_PER_RADIAN..=FARTHEST_PX).contains(&self.px_per_radian)
+            && self.origin.iter().all(is_near)
+            && turns.iter().all(|turn| turn.is_finite())
     }
 
     /// Pixels of the canvas after which directions repeat; `None` on a plane, on which they do not.

@@ -13,13 +13,11 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::{self, RejectedSource, SourceOptions};
 
 use super::paths::place_of;
-use super::projection::ProjectionRecord;
+use super::projection::{FARTHEST_PX, ProjectionRecord};
 use super::record::{Canvas, ImageRecord, MeshRecord, Project, StackMemberRecord};
 
 /// What a project must be to be read again.
 const AS_WRITTEN: &str = "Give a project file as `trueup stitch --project` wrote it.";
-/// Vertices farther away than this, in panorama pixels, are no places any more: no file format is as wide.
-const FARTHEST_PX: f64 = 4_294_967_296.0;
 /// Vertices may lie this far beyond the canvas that is recorded with them, which is rounded to whole pixels.
 const ROUNDED_PX: f64 = 1.0;
 /// Largest distance of a grid's recorded sources from an even grid, relative to the photograph's longer side: what
@@ -64,6 +62,7 @@ impl Recorded {
         if !project.light.is_none_or(|range| range.is_sound()) {
             return Err(Error::input("the project", "its range of light is none", AS_WRITTEN));
         }
+        check_projection(project)?;
         if !project.by_cameras.is_none_or(|plane| plane.is_sound()) {
             return Err(Error::input("the project", "its plane of directions is none", AS_WRITTEN));
         }
@@ -126,10 +125,23 @@ fn whole_canvas(meshes: &mut [GridMesh], part: Canvas) -> Canvas {
 /// The grids of used photographs over the original photographs, in the panorama, without cells that are torn.
 ///
 /// # Errors
-/// [`Error::Input`] if one is missing or damaged.
+/// [`Error::Input`] if one is missing or damaged, or the recorded projection is.
 pub(crate) fn whole_grids(project: &Project, records: &[&ImageRecord]) -> Result<Vec<GridMesh>> {
+    check_projection(project)?;
     let turn = project.projection.as_ref().and_then(ProjectionRecord::turn_px);
     records.iter().map(|record| Ok(without_torn_cells(&record.grid()?, turn))).collect()
+}
+
+/// Refuses a projection by which nothing can have been drawn: its scale divides, and a turn of no length has no end.
+fn check_projection(project: &Project) -> Result<()> {
+    match project.projection.is_none_or(|projection| projection.is_sound()) {
+        true => Ok(()),
+        false => Err(Error::input(
+            "the project",
+            "its projection is damaged: no panorama is of such a scale or place",
+            AS_WRITTEN,
+        )),
+    }
 }
 
 impl ImageRecord {
@@ -399,6 +411,29 @@ mod tests {
         assert_eq!((recorded.layout.width, recorded.layout.placed[1].mesh.target[4]), (14, [9.5, 3.0]));
         let refused = read.images[0].grid().expect_err("no grid of the panorama").to_string();
         assert!(refused.contains("compose it again"), "{refused}");
+    }
+
+    /// A scale of 0 divides places by nothing, and a turn of no length is searched for its end forever.
+    #[test]
+    fn a_projection_without_a_scale_is_refused() {
+        let with = |scale: f64, origin: f64| {
+            let mut drawn = project();
+            drawn["projection"] = json!({
+                "kind": "equirectangular", "yaw_deg": 0.0, "pitch_deg": 0.0, "roll_deg": 0.0, "panini_distance": 1.0,
+                "px_per_radian": scale, "origin": [origin, -0.1], "sphere": null
+            });
+            drawn["mesh_canvas"] = drawn["canvas"].clone();
+            drawn
+        };
+        assert!(read(&with(100.0, -0.1)).is_ok());
+        for (scale, origin) in [(0.0, -0.1), (-100.0, -0.1), (1e-9, -0.1), (1e300, -0.1), (100.0, 1e300)] {
+            let refused = read(&with(scale, origin)).expect_err("no scale").to_string();
+            assert!(refused.contains("its projection is damaged"), "{scale} {origin}: {refused}");
+            let damaged = Project::from_json(&with(scale, origin).to_string(), "p.json").expect("a project");
+            let records: Vec<&ImageRecord> = damaged.used_images().collect();
+            let refused = whole_grids(&damaged, &records).expect_err("no scale").to_string();
+            assert!(refused.contains("its projection is damaged"), "{scale} {origin}: {refused}");
+        }
     }
 
     /// A vertex that the projection has no place for is written as null and read as no number.
