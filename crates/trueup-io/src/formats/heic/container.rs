@@ -75,6 +75,10 @@ impl PlaceLayout {
         fields.number(2)?;
         fields.number(self.base_bytes)?;
         let pieces = fields.number(2)?;
+        // Pieces without fields of their own would be all the same, and cost the file nothing: there can be any number of them.
+        if pieces > 1 && self.offset_bytes + self.length_bytes == 0 {
+            return Some(Item { number, length: u64::MAX });
+        }
         let mut length = 0_u64;
         for _ in 0..pieces {
             fields.number(self.index_bytes)?;
@@ -157,6 +161,19 @@ mod tests {
         // Each of them once and again stands for more than a file of 11 kB or 85 kB and a megabyte.
         assert!(check_copies(&file(1, 2000)).is_err());
         assert!(check_copies(&file(10_000, 1)).is_err());
+    }
+
+    /// Ten bytes an entry, each with 65,535 pieces: such a file of ten megabytes would take hours.
+    #[test]
+    fn pieces_that_cost_the_file_nothing_are_refused() {
+        let listed = |pieces: u16| {
+            let entry = [&[0, 7, 0, 0][..], &pieces.to_be_bytes()].concat();
+            let places = [&[0, 0, 0, 0, 0, 0, 0, 3][..], &entry.repeat(3)].concat();
+            let boxes = [vec![0; 4], media_box(b"iloc", &places)].concat();
+            [media_box(b"ftyp", b"heic"), media_box(b"meta", &boxes)].concat()
+        };
+        assert!(check_copies(&listed(1)).is_ok());
+        assert!(check_copies(&listed(u16::MAX)).is_err());
     }
 
     #[test]
