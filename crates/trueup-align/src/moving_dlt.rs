@@ -11,7 +11,7 @@ const LEAST_LEFT: f64 = 0.25;
 /// What is known of slopes besides, in matches a decay length away.
 const KNOWN_SLOPE: f64 = 0.01;
 /// Smallest weight of a match; it keeps vertices far from all matches determined.
-const WEIGHT_FLOOR: f64 = 0.0015;
+pub(crate) const WEIGHT_FLOOR: f64 = 0.0015;
 
 /// Whether at least so many matches tell of a place (source pixels): by the sum of their weights, each 1 at the place itself, of which [`LEAST_LEFT`]
 /// must be left beside the slopes that are fitted with it.

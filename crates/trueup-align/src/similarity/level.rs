@@ -239,8 +239,8 @@ impl<'a> CameraLevel<'a> {
         if self.says.iter().any(contradicts) { self.without_horizon() } else { self.clone() }
     }
 
-    /// What told of the vertical `down`, which has the covariance `covariance` about its tangents, rad^2, with lines in `photographs` photographs: the lines first, by what the
-    /// other sources leave of the information. `None` where that is less than [`LEAST_SHARE`].
+    /// What told of the vertical `down`, which has the covariance `covariance` about its tangents, rad^2, with lines in `photographs` photographs: the lines first. `covariance` is that
+    /// of all together, so that the lines' share comes of what its inverse has beyond the information of the other sources. `None` where that is less than [`LEAST_SHARE`].
     pub(super) fn evidence_beside_lines(
         &self,
         down: &Vector3<f64>,

@@ -12,7 +12,7 @@ use super::input::WarpInput;
 use super::limits::{MIN_DEPTH, depth_at, refuse, with_depth};
 use super::options::WarpOptions;
 use super::placement::one_after_another;
-use crate::moving_dlt::MovingDlt;
+use crate::moving_dlt::{MovingDlt, WEIGHT_FLOOR};
 
 /// Places the photographs one after the other: each vertex goes where the homography goes that fits the matches around
 /// it best.
@@ -27,9 +27,6 @@ pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &Stag
     let weighting = Weighting { kernel: options.apap_kernel, decay_px: options.apap_decay_px, floor: WEIGHT_FLOOR };
     place_weighted(input, weighting, context)
 }
-
-/// Smallest weight of a match; it keeps vertices far from all matches determined.
-const WEIGHT_FLOOR: f64 = 0.0015;
 
 /// How the weight of a match falls with its distance from a vertex.
 #[derive(Debug, Clone, Copy)]
