@@ -110,7 +110,7 @@ pub(super) fn of_stacks<'a>(
 }
 
 /// The same photographs, of which those of floating point samples are handed out in `light`.
-pub(super) fn handed_out_in(mut images: Vec<SourceImage>, light: Option<LightRange>) -> Vec<SourceImage> {
+pub(crate) fn handed_out_in(mut images: Vec<SourceImage>, light: Option<LightRange>) -> Vec<SourceImage> {
     for image in &mut images {
         image.light = light.filter(|_| image.is_float);
         for member in &mut image.stack {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use trueup_compose::fusion::ExposureFusion;
+use trueup_core::color::LightRange;
 use trueup_core::diagnostics::Subject;
 use trueup_core::mask::Masks;
 use trueup_core::source::{PhotographSource, SourceImage};
@@ -109,11 +110,7 @@ impl PhotographSet {
             }
         };
         let images = light::handed_out_in(images, light);
-        let colors = match light {
-            Some(_) => PhotographColors::survey_to_srgb(&images, context),
-            None => PhotographColors::survey(&images, context),
-        };
-        let files = over(&images, measuring.kept_bytes).in_colors(colors).in_light(light).with_masks(masks);
+        let files = handed_out(over(&images, measuring.kept_bytes), &images, light, context).with_masks(masks);
         Ok(Self { images, rejected, masks: records, lens_from: None, files: Arc::new(files), measuring })
     }
 
@@ -151,6 +148,21 @@ impl PhotographSet {
         };
         photographs.par_iter().map(key).collect()
     }
+}
+
+/// The photographs `files` of `images`, whose [light is told](light::handed_out_in), in one color space and in that light: as panoramas are stitched
+/// from them, and measured again.
+pub(crate) fn handed_out(
+    files: FilePhotographs,
+    images: &[SourceImage],
+    light: Option<LightRange>,
+    context: &StageContext,
+) -> FilePhotographs {
+    let colors = match light {
+        Some(_) => PhotographColors::survey_to_srgb(images, context),
+        None => PhotographColors::survey(images, context),
+    };
+    files.in_colors(colors).in_light(light)
 }
 
 /// Puts the reason that is `known` for a file in place of what its content tells.

@@ -19,16 +19,17 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::source::SourceImage;
 use trueup_core::truth::{ImageTruth, Truth};
 use trueup_core::{Error, Result, StageContext};
-use trueup_io::color::PhotographColors;
 use trueup_io::decode::FilePhotographs;
 
 use super::measures::{HUNDREDTHS, Measures};
+use crate::pipeline::light::handed_out_in;
+use crate::pipeline::photographs::handed_out;
 use crate::project::read::{find_photograph, whole_grids};
 use crate::project::record::{ImageRecord, Project};
 pub use matches::{MatchEvaluation, PairMatchEvaluation, evaluate_matches};
 pub use pixels::{PixelEvaluation, compare_overlaps, evaluate_pixels, scale_up_to};
 
-/// The recorded photographs, to be read again from their files, of which the paths are tried as by [`evaluate_pixels`].
+/// The recorded photographs in the recorded light, to be read again from their files, of which the paths are tried as by [`evaluate_pixels`].
 ///
 /// # Errors
 /// Those of [`find_photograph`].
@@ -41,8 +42,9 @@ fn photographs(
     let options = &project.options.measure.source;
     let find = |record: &&ImageRecord| find_photograph(record, project_folder, options, context);
     let images = records.iter().map(find).collect::<Result<Vec<SourceImage>>>()?;
-    let colors = PhotographColors::survey(&images, context);
-    Ok(FilePhotographs::new(images, 0).in_colors(colors).fused_by(Arc::new(ExposureFusion)))
+    let images = handed_out_in(images, project.light);
+    let files = FilePhotographs::new(images.clone(), 0).fused_by(Arc::new(ExposureFusion));
+    Ok(handed_out(files, &images, project.light, context))
 }
 
 /// A panorama measured against the truth. Angles in degrees.

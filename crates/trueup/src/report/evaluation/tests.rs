@@ -1,4 +1,9 @@
+use trueup_core::color::LightRange;
+use trueup_core::raster::Photograph;
+use trueup_core::source::PhotographSource;
+
 use super::*;
+use crate::project::record::MeshRecord;
 
 /// Two photographs of 40 x 30 px whose middles are turned by these angles in degrees, on grids of one cell.
 fn project(turns: [f64; 2]) -> Project {
@@ -115,4 +120,31 @@ fn photographs_from_different_places_have_no_alignment() {
     assert!(evaluate(&project([0.0, 0.0]), &moved).expect("fits").align_px.is_some());
     moved.images[0].center = Some([0.0, 0.0, 1.0]);
     assert_eq!(evaluate(&project([0.0, 0.0]), &moved).expect("fits").align_px, None);
+}
+
+/// What is brighter than white is measured as it was stitched, not clipped.
+#[test]
+fn photographs_are_read_again_in_the_recorded_light() {
+    let desk = tempfile::tempdir().expect("a folder");
+    // Radiance: mantissas of red, green and blue, and an exponent (2^(130 - 128) = 4 for a mantissa of 256).
+    let [bright, brighter] = [[64, 64, 64, 130], [128, 128, 128, 132]];
+    let header = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 30 +X 40\n";
+    let pixels = [bright.repeat(600), brighter.repeat(600)].concat();
+    for name in ["a.hdr", "b.hdr"] {
+        std::fs::write(desk.path().join(name), [header.as_bytes(), &pixels].concat()).expect("written");
+    }
+    let mut stitched = project([0.0, 0.0]);
+    for image in &mut stitched.images {
+        image.path = image.path.replace("jpg", "hdr");
+    }
+    stitched.light = Some(LightRange { white: 1.0, peak: 16.0 });
+    let records: Vec<&ImageRecord> = stitched.used_images().collect();
+    let levels = |project: &Project| {
+        let files = photographs(project, &records, desk.path(), &StageContext::default()).expect("there");
+        assert_eq!(files.light(), project.light);
+        let Photograph::Sixteen(raster) = files.photograph(0).expect("decoded") else { return None };
+        Some([raster.pixel(20, 5)[0], raster.pixel(20, 25)[0]])
+    };
+    let [one, other] = levels(&stitched).expect("light");
+    assert!(one < other, "{one} {other}: one and eight times white");
 }
