@@ -128,7 +128,11 @@ fn truth(lines: &mut LabeledLines, found: &Evaluation) {
     }
     for photograph in &found.photographs {
         let theta = photograph.theta_error_deg.map_or(String::new(), |degrees| format!(", theta {degrees:+.3}"));
-        lines.item("", &format!("{}: {:+.3} degrees off upright{theta}", photograph.file, photograph.upright_deg));
+        let off_upright = match photograph.upright_deg {
+            Some(degrees) => format!("{degrees:+.3} degrees off upright"),
+            None => "its middle is not shown".to_owned(),
+        };
+        lines.item("", &format!("{}: {off_upright}{theta}", photograph.file));
     }
 }
 

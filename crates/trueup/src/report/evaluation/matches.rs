@@ -147,7 +147,7 @@ fn full(one: &PointMatch, frames: [&WorkingFrame; 2]) -> PointMatch {
 fn of_pair(pair: &MatchedPair, period: Option<f64>, [a, b]: [&String; 2]) -> Option<PairMatchEvaluation> {
     let mut distances: Vec<f64> = panorama_distances(pair, period).filter(|distance| distance.is_finite()).collect();
     let squares: f64 = distances.iter().map(|distance| distance * distance).sum();
-    let median_px = median(&mut distances)?;
+    let median_px = middle(&mut distances)?;
     let matches = distances.len();
     Some(PairMatchEvaluation {
         a: a.clone(),
@@ -161,20 +161,20 @@ fn of_pair(pair: &MatchedPair, period: Option<f64>, [a, b]: [&String; 2]) -> Opt
 /// `None` without pairs.
 fn summed(by_pair: Vec<PairMatchEvaluation>) -> Option<MatchEvaluation> {
     let of_pairs =
-        |figure: fn(&PairMatchEvaluation) -> f64| median(&mut by_pair.iter().map(figure).collect::<Vec<_>>());
+        |figure: fn(&PairMatchEvaluation) -> f64| middle(&mut by_pair.iter().map(figure).collect::<Vec<_>>());
     let (rms_px, median_px) = of_pairs(|pair| pair.rms_px).zip(of_pairs(|pair| pair.median_px))?;
     let matches = by_pair.iter().map(|pair| pair.matches).sum();
     Some(MatchEvaluation { pairs: by_pair.len(), matches, rms_px, median_px, by_pair })
 }
 
-/// The middle of the values, or the mean of the two beside it.
-fn median(values: &mut [f64]) -> Option<f64> {
+/// The middle of the values, or the mean of the two beside it: of few pairs, [`trueup_core::statistics::median`] would tell the worse.
+fn middle(values: &mut [f64]) -> Option<f64> {
     values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
+    let half = values.len() / 2;
     match values {
         [] => None,
-        _ if values.len() % 2 == 1 => Some(values[middle]),
-        _ => Some((values[middle - 1] + values[middle]) / 2.0),
+        _ if values.len() % 2 == 1 => Some(values[half]),
+        _ => Some((values[half - 1] + values[half]) / 2.0),
     }
 }
 

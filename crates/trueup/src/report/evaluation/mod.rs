@@ -113,8 +113,8 @@ pub struct StatedEvaluation {
 pub struct PhotographEvaluation {
     /// File name.
     pub file: String,
-    /// By how much its middle is turned beyond upright.
-    pub upright_deg: f64,
+    /// By how much its middle is turned beyond upright; `None` where the panorama does not show that.
+    pub upright_deg: Option<f64>,
     /// By how much the prior's rotation is wrong, relative to the first photograph.
     pub theta_error_deg: Option<f64>,
     /// By how much the vertical that the measures state its lean by is wrong, as drawn in its middle; `None` if they state none.
@@ -175,11 +175,13 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     let thetas: Option<Vec<f64>> = records.iter().map(|record| Some(record.theta_deg?.to_radians())).collect();
     let theta_errors = thetas.as_ref().and_then(|thetas| relative_turns(thetas, &gammas, 0));
     let distortion = metrics::local_distortion(&meshes, Outside::Center, period);
+    let true_leans: Vec<Option<f64>> =
+        upright.photographs.iter().map(|&lean| Some(lean).filter(|lean| !lean.is_nan())).collect();
     let leans: Vec<Option<StatedLean>> =
-        (0..known.len()).map(|k| StatedLean::of(project, &known[k], &meshes[k], upright.photographs[k])).collect();
+        (0..known.len()).map(|k| StatedLean::of(project, &known[k], &meshes[k], true_leans[k]?)).collect();
     let photographs = (0..known.len()).map(|k| PhotographEvaluation {
         file: known[k].truth.file.clone(),
-        upright_deg: upright.photographs[k].to_degrees(),
+        upright_deg: true_leans[k].map(f64::to_degrees),
         theta_error_deg: theta_errors.as_ref().map(|errors| errors[k].to_degrees()),
         lean_error_deg: leans[k].map(|lean| lean.error_deg),
     });

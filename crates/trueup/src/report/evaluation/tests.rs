@@ -61,8 +61,26 @@ fn known_turns_have_known_figures() {
     near(evaluation.theta_error_deg.expect("rotations"), 3.0);
     near(evaluation.theta_error_max_deg.expect("rotations"), 3.0);
     assert_eq!(evaluation.photographs[0].file, "a.jpg");
-    near(evaluation.photographs[1].upright_deg, -2.0);
+    near(evaluation.photographs[1].upright_deg.expect("shown"), -2.0);
     near(evaluation.photographs[1].theta_error_deg.expect("rotations"), -3.0);
+}
+
+/// What is not known is written as nothing, and read so again.
+#[test]
+fn an_evaluation_without_a_middle_is_read_as_it_was_written() {
+    let mut torn = project([3.0, -1.0]);
+    let even = GridMesh::regular(40.0, 30.0, 8.0);
+    let mut target = even.target.clone();
+    let is_middle = |vertex: &[f64; 2]| (vertex[0] - 20.0).abs() < 5.0;
+    target.iter_mut().filter(|vertex| is_middle(vertex)).for_each(|vertex| *vertex = [f64::NAN; 2]);
+    let source = even.target.clone();
+    torn.images[1].mesh = Some(MeshRecord { rows: even.rows, cols: even.columns, source, target });
+    let evaluation = evaluate(&torn, &truth([2.0, 1.0])).expect("two photographs");
+    assert_eq!(evaluation.photographs[0].upright_deg, None);
+    assert!((evaluation.upright_deg - 2.0).abs() < 1e-9, "the other's: {}", evaluation.upright_deg);
+    let text = serde_json::to_string(&evaluation).expect("written");
+    let read: Evaluation = serde_json::from_str(&text).expect("read again");
+    assert_eq!(read.photographs, evaluation.photographs);
 }
 
 /// The first photograph's vertical is stated 0.3 degrees off, and that it leans by 7 where its lines are: compared are the verticals in its middle. The
