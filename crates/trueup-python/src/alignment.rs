@@ -119,7 +119,7 @@ impl Alignment {
         self.alignment.project.to_json().map_err(|error: Error| exception(py, error))
     }
 
-    /// What messages call the photographs, in the order given.
+    /// What messages call the photographs, in the order of the record.
     fn photograph_names(&self) -> Vec<String> {
         self.alignment.project.photograph_names()
     }

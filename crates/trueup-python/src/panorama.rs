@@ -124,7 +124,7 @@ impl Panorama {
         self.alignment.project.to_json().map_err(|error| exception(py, error))
     }
 
-    /// What messages call the photographs, in the order given.
+    /// What messages call the photographs, in the order of the record.
     fn photograph_names(&self) -> Vec<String> {
         self.alignment.project.photograph_names()
     }

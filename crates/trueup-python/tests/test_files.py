@@ -1,8 +1,10 @@
 """A panorama's files."""
 
+import io
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -56,3 +58,11 @@ def test_notebooks_show_it(panorama: trueup.Panorama, tmp_path: Path) -> None:
     text = panorama._repr_html_()
     assert text.startswith("<img alt=") and "5 of 5 used" in text
     assert repr(panorama).endswith("5 of 5 photographs>")
+
+
+def test_notebooks_show_a_strip(monkeypatch: pytest.MonkeyPatch, panorama: trueup.Panorama) -> None:
+    """Lower than what is put together to a pixel."""
+    strip = np.full((3, 5000, 3), 200, np.uint8)
+    monkeypatch.setattr(trueup.Panorama, "image", strip)
+    shown = Image.open(io.BytesIO(panorama._repr_png_()))
+    assert shown.size == (1000, 1) and shown.getpixel((0, 0)) == (200, 200, 200)

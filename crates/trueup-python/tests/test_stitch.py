@@ -160,6 +160,19 @@ def test_an_alignment_serves_other_photographs(folder: Path, pictures: list[Arra
         alignment.compose([picture[:, :333] for picture in darker])
 
 
+def test_photographs_stand_in_the_places_that_were_given(folder: Path, pictures: list[Array]) -> None:
+    """The record has what cannot be read last."""
+    unreadable = folder / "unreadable.png"
+    unreadable.write_bytes(b"no picture")
+    files = [folder / "room" / f"{number}.png" for number in range(5)]
+    alignment = trueup.align([unreadable, *files], crop="none")
+    assert [photograph.used for photograph in alignment.photographs] == [True] * 5 + [False]
+    own = alignment.compose()
+    again = alignment.compose([np.zeros_like(pictures[0]), *pictures])
+    assert np.array_equal(again.image, own.image)
+    assert np.array_equal(alignment.compose(pictures).image, own.image)
+
+
 def test_an_alignment_is_drawn_in_other_views(pictures: list[Array]) -> None:
     alignment = trueup.align(pictures)
     sphere = alignment.compose(projection="equirectangular", scale=0.5)

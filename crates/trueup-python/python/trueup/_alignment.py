@@ -15,6 +15,11 @@ from trueup._workers import Workers
 class Alignment(Recorded[_trueup.Alignment]):
     """The geometry of a panorama: cameras, vanishing points, deformed grids, canvas. Made by :func:`trueup.align`."""
 
+    def __init__(self, native: _trueup.Alignment, given: list[str] | None = None) -> None:
+        super().__init__(native)
+        self._given = given
+        """What the photographs were given as, in that order; ``None`` where a project tells of them."""
+
     def compose(
         self,
         photographs: Photographs | None = None,
@@ -26,7 +31,9 @@ class Alignment(Recorded[_trueup.Alignment]):
         """The panorama of the photographs that were aligned, or of others in their places: one alignment serves every moment of
         a rig or a video.
 
-        ``photographs`` are as many as were used, or as were given, in that order and of the same sizes. Keywords set options
+        ``photographs`` are of the same sizes. They are as many as were used, in the order of :attr:`photographs`; or as many as were given to
+        :func:`trueup.align`, in that order; or, of a folder or a project file, as many as :attr:`photographs`, in their order. What stands for
+        photographs that were left out, and for the other exposures of brackets, is passed over. Keywords set options
         of the view, the canvas, the light and the file: ``projection``, ``crop``, ``scale`` and so on; those of the geometry are
         refused. With ``workers``, other programs make the photographs small and finish the canvas, region by region.
 
@@ -40,9 +47,12 @@ class Alignment(Recorded[_trueup.Alignment]):
 
     def _of_those_used(self, shown: list[str | tuple[str, Any]]) -> list[str | tuple[str, Any]]:
         """Of as many photographs as were given, those in the places of the used ones."""
-        used = [photograph.used for photograph in self.photographs]
-        if len(shown) == len(used) != sum(used):
-            return [one for one, is_used in zip(shown, used, strict=True) if is_used]
+        recorded = [photograph.path for photograph in self.photographs]
+        used = [photograph.path for photograph in self.photographs if photograph.used]
+        # Photographs that cannot be read stand behind all others in the record, wherever they were given.
+        for places in (self._given, recorded):
+            if places is not None and len(shown) == len(places) != len(used) and set(used) <= set(places):
+                return [shown[places.index(path)] for path in used]
         return shown
 
     def __repr__(self) -> str:
@@ -102,9 +112,10 @@ def align(
 
     Raises what :func:`stitch` raises.
     """
+    given = native(photographs)
     with Heard(progress) as heard:
-        [alignment] = _trueup.align(native(photographs), _native_keywords(keywords), False, heard, workers)
-        return Alignment(alignment)
+        [alignment] = _trueup.align(given, _native_keywords(keywords), False, heard, workers)
+        return Alignment(alignment, _names(given))
 
 
 def align_all(
@@ -115,8 +126,10 @@ def align_all(
     **keywords: Unpack[StitchKeywords],
 ) -> list[Alignment]:
     """The geometry of every group of photographs that overlap, the largest group first. Otherwise as :func:`align`."""
+    given = native(photographs)
     with Heard(progress) as heard:
-        return [Alignment(one) for one in _trueup.align(native(photographs), _native_keywords(keywords), True, heard, workers)]
+        alignments = _trueup.align(given, _native_keywords(keywords), True, heard, workers)
+        return [Alignment(one, _names(given)) for one in alignments]
 
 
 def open_project(
@@ -140,6 +153,11 @@ def open_project(
     folder = None if photographs is None else os.fspath(photographs)
     with Heard(progress) as heard:
         return Alignment(_trueup.open_project(os.fspath(path), folder, relight, dict(keywords), heard))
+
+
+def _names(given: list[str | tuple[str, Any]]) -> list[str]:
+    """What a record calls photographs by that were given so."""
+    return [one if isinstance(one, str) else one[0] for one in given]
 
 
 def _native_keywords(keywords: StitchKeywords) -> dict[str, Any]:

@@ -95,10 +95,12 @@ class Panorama(Recorded[_trueup.Panorama]):
             # The curve of sRGB, near enough for a look.
             image = np.clip(image, 0, 1) ** (1 / 2.2) * 255
         step = -(-max(image.shape) // _SHOWN_SIDE_PX)
-        height, width = (max(side // step, 1) for side in image.shape[:2])
-        block = image[: height * step, : width * step]
+        # Of a strip that is lower than a step, all of its height is one row.
+        down, across = (min(step, side) for side in image.shape[:2])
+        height, width = image.shape[0] // down, image.shape[1] // across
+        block = image[: height * down, : width * across]
         if step > 1:
-            block = block.reshape(height, step, width, step, 3).mean(axis=(1, 3))
+            block = block.reshape(height, down, width, across, 3).mean(axis=(1, 3))
         return _trueup.png(np.ascontiguousarray(np.rint(block), dtype=np.uint8))
 
     def _repr_html_(self) -> str:

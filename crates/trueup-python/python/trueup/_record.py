@@ -92,7 +92,8 @@ class Recorded(Generic[Native]):
 
     @property
     def photographs(self) -> list[Photograph]:
-        """What became of every photograph that was given, in the order given."""
+        """What became of every photograph: those that can be read, in the order given, then those that cannot. Exposures of one bracket are
+        one photograph."""
         return [
             Photograph(
                 name=name,
