@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 
 use crate::cameras::CameraTransfer;
-use crate::evidence::{CommonSquare, OverlapGap};
+use crate::evidence::{self, CommonSquare, FULL_PX, NEGLIGIBLE_SHARE, OverlapGap};
 use crate::moving_dlt::DECAY_PX;
 
 /// Largest distance of a carried vertex from its place without local corrections, in diagonals of the other photograph.
@@ -14,8 +14,8 @@ pub(super) const MAX_DEVIATION: f64 = 0.1;
 /// The correction at a place is a local linear regression of the matches' deviations from the cameras, weighted by
 /// distance and robustly, and drawn towards zero: as strongly as the noise of a match exceeds what neighbors have in common
 /// (the ridge of best linear prediction). Where the photographs were taken from one point it vanishes and the
-/// places are as consistent as the cameras. Deviations of several planes it follows only in part, see
-/// [`Self::common_square`].
+/// places are as consistent as the cameras. So it does where only things that moved themselves deviate. Deviations of several planes it follows only in
+/// part, see [`Self::common_square`].
 ///
 /// # Source
 /// A. E. Hoerl and R. W. Kennard, "Ridge regression: biased estimation for nonorthogonal problems" (1970): the best ridge is the
@@ -35,6 +35,7 @@ pub(super) struct CameraResidual<'a> {
     margin: f64,
 }
 
+#[derive(Debug, Clone, Copy)]
 struct Sample {
     position: Vector2<f64>,
     deviation: Vector2<f64>,
@@ -50,11 +51,28 @@ fn robust_weight(misfit: Vector2<f64>) -> f64 {
     1.0 / (1.0 + misfit.norm_squared() / (NOISE_PX * NOISE_PX))
 }
 
-/// What neighboring matches' deviations have in common, in the mean of all.
-fn common_square(samples: &[Sample]) -> CommonSquare {
+/// What the matches say of how far the cameras are wrong.
+fn gaps(samples: &[Sample]) -> Vec<OverlapGap> {
     let gap =
         |sample: &Sample| OverlapGap { place: sample.position, gap: sample.deviation, known: Matrix2::identity() };
-    CommonSquare::of(&samples.iter().map(gap).collect::<Vec<_>>())
+    samples.iter().map(gap).collect()
+}
+
+/// Without those of things that moved, where all others say that the cameras are right; with what neighbors' deviations have in common, in the
+/// mean of all.
+fn of_what_stayed(samples: Vec<Sample>) -> (Vec<Sample>, CommonSquare) {
+    let is_negligible = |common: CommonSquare| evidence::share(common.sure(), FULL_PX) <= NEGLIGIBLE_SHARE;
+    let all = gaps(&samples);
+    let common = CommonSquare::of(&all);
+    if is_negligible(common) {
+        return (samples, common);
+    }
+    let still: Vec<usize> = evidence::still(&all).collect();
+    let of_still = CommonSquare::of(&still.iter().map(|&k| all[k]).collect::<Vec<_>>());
+    if !is_negligible(of_still) {
+        return (samples, common);
+    }
+    (still.into_iter().map(|k| samples[k]).collect(), of_still)
 }
 
 /// Square, per axis, of a match's deviation, in the robust mean.
@@ -86,7 +104,7 @@ impl<'a> CameraResidual<'a> {
             .collect();
         let [x, y] = cameras.to().principal_point;
         let margin = MAX_DEVIATION * 2.0 * x.hypot(y);
-        let common = common_square(&samples);
+        let (samples, common) = of_what_stayed(samples);
         let shrinkage = shrinkage(mean_square(&samples), common.mean());
         Self { cameras, samples, common_square: common.sure(), shrinkage, margin }
     }
@@ -109,7 +127,7 @@ impl<'a> CameraResidual<'a> {
         self.common_square
     }
 
-    /// Farthest that any match deviates from the cameras, pixels.
+    /// Farthest that any match deviates from the cameras, pixels; of what stayed, where nothing but things that moved deviates.
     pub(super) fn largest_deviation(&self) -> f64 {
         self.samples.iter().map(|sample| sample.deviation.norm()).fold(0.0, f64::max)
     }
@@ -204,5 +222,13 @@ mod tests {
         let shift = Vector2::new(0.3, -0.8);
         let found = corrected(|_, _| shift);
         assert!((found - shift).norm() < 0.02, "{found}");
+    }
+
+    /// A thing that covers a fifth of the overlap, around the point, went 12 px to the right; all else is where the cameras have it.
+    #[test]
+    fn what_moved_corrects_nothing() {
+        let is_thing = |column: usize, row: usize| (9..23).contains(&column) && (7..18).contains(&row);
+        let moved = |column: usize, row: usize| Vector2::new(if is_thing(column, row) { 12.0 } else { 0.0 }, 0.0);
+        assert_eq!(corrected(moved), Vector2::zeros());
     }
 }

@@ -79,6 +79,9 @@ impl StraightInput<'_> {
 
 /// How much of the distance at which matched points land in `grids` is common to neighbors: the mean over the points of
 /// the shares that they would have of their weights, and 0 where noise alone may have it. Shares are never negative, so that noise comes to some: to the more, the worse matches are found.
+///
+/// Cameras that moved leave most of what they show a little apart; what moved itself lies far from where it was, and leaves all else where it is. The farthest of every overlap are
+/// therefore not asked ([`evidence::still`]).
 pub(super) fn misaligned_share(points: &[PairMatches], grids: &CurrentGrids) -> f64 {
     /// Points of a pair that are asked; more hardly change the mean.
     const ASKED: usize = 400;
@@ -87,20 +90,29 @@ pub(super) fn misaligned_share(points: &[PairMatches], grids: &CurrentGrids) -> 
         matched(pair).step_by(step).map(|(_, ends)| point_gap(pair, ends, grids)).collect()
     };
     let gaps: Vec<Vec<OverlapGap>> = points.par_iter().map(gaps).collect();
-    if !evidence::is_beyond_noise(&gaps) {
+    let all: Vec<Vec<OverlapGap>> = gaps.iter().map(|gaps| gaps.iter().map(believed).collect()).collect();
+    if !evidence::is_beyond_noise(&all) {
         return 0.0;
     }
     let share = |common: f64| evidence::share(common, FULL_PX);
-    let shares = |gaps: &Vec<OverlapGap>| evidence::common_squares(gaps).into_iter().map(share).sum::<f64>();
-    let shares: Vec<f64> = gaps.par_iter().map(shares).collect();
-    let counted: usize = gaps.iter().map(Vec::len).sum();
-    shares.into_iter().sum::<f64>() / counted.max(1) as f64
+    let shares = |gaps: &Vec<OverlapGap>| -> (usize, f64) {
+        let asked: Vec<OverlapGap> = evidence::still(gaps).map(|k| believed(&gaps[k])).collect();
+        (asked.len(), evidence::common_squares(&asked).into_iter().map(share).sum())
+    };
+    let shares: Vec<(usize, f64)> = gaps.par_iter().map(shares).collect();
+    let counted: usize = shares.iter().map(|&(asked, _)| asked).sum();
+    shares.into_iter().map(|(_, share)| share).sum::<f64>() / counted.max(1) as f64
 }
 
-/// What a matched point of `pair` says; distances beyond the believed one count as that.
+/// What is believed of how far apart a match lies: distances beyond the believed one count as that.
+fn believed(one: &OverlapGap) -> OverlapGap {
+    OverlapGap { gap: one.gap * shortening(one.gap.norm()), ..*one }
+}
+
+/// How far apart a matched point of `pair` lies.
 fn point_gap(pair: &PairMatches, [p, q]: [Vector2<f64>; 2], grids: &CurrentGrids) -> OverlapGap {
     let gap = grids.gap(PhotographPixel { photograph: pair.a, at: p }, PhotographPixel { photograph: pair.b, at: q });
-    OverlapGap { place: p, gap: gap * shortening(gap.norm()), known: Matrix2::identity() }
+    OverlapGap { place: p, gap, known: Matrix2::identity() }
 }
 
 /// Shares of their weights that the matches of all lists have.
@@ -160,7 +172,7 @@ impl LineAlignmentInput<'_> {
     fn evidence(&self, a: usize, b: usize, grids: &CurrentGrids) -> Vec<(Match, OverlapGap)> {
         let points = self.points.iter().enumerate().filter(|(_, points)| (points.a, points.b) == (a, b));
         let points = points.flat_map(|(list, points)| {
-            chosen(points).map(move |(k, ends)| (Match::Point(list, k), point_gap(points, ends, grids)))
+            chosen(points).map(move |(k, ends)| (Match::Point(list, k), believed(&point_gap(points, ends, grids))))
         });
         let lines = self.matched.iter().enumerate().filter(|(_, lines)| (lines.a, lines.b) == (a, b));
         let lines = lines.flat_map(|(list, lines)| lines.lines.iter().enumerate().map(move |line| (list, line)));
