@@ -70,27 +70,42 @@ impl HalfPlanes {
 
     /// Where the photographs lie and how they are deformed there, at points `step_px` apart.
     pub(super) fn sampled(&self, input: &WarpInput<'_>, step_px: f64) -> Vec<Samples> {
-        let points = |photograph: usize| -> Vec<Vector2<f64>> {
-            let frame = &input.frames[photograph];
-            let grid = GridMesh::regular(frame.width, frame.height, step_px);
-            (0..grid.len()).map(|vertex| grid.source(vertex)).collect()
-        };
-        let of_photograph = |(photograph, route): (usize, &Route)| match route {
-            Route::ThroughRef(onto_ref) => {
-                let sample = |point| Sample { place: onto_ref.apply(point), derivative: onto_ref.jacobian(point) };
-                Samples::ThroughRef(points(photograph).into_iter().map(sample).collect())
-            }
-            Route::OnTar { onto_tar, onto_ref } => {
-                let points = points(photograph);
-                let in_front = |point: &&Vector2<f64>| depth_at(onto_ref, &input.cameras[photograph], **point) > 0.0;
-                Samples::OnTar {
-                    derivatives: points.iter().map(|&point| onto_tar.jacobian(point)).collect(),
-                    in_front: points.iter().filter(in_front).map(|&point| onto_ref.apply(point)).collect(),
+        let of_photograph = |(photograph, route): (usize, &Route)| {
+            let points = straightened(input, photograph, step_px);
+            match route {
+                Route::ThroughRef(onto_ref) => {
+                    let sample = |point: &Sample| Sample {
+                        place: onto_ref.apply(point.place),
+                        derivative: onto_ref.jacobian(point.place) * point.derivative,
+                    };
+                    Samples::ThroughRef(points.iter().map(sample).collect())
+                }
+                Route::OnTar { onto_tar, onto_ref } => {
+                    let camera = &input.cameras[photograph];
+                    let in_front = |point: &&Sample| depth_at(onto_ref, camera, point.place) > 0.0;
+                    let derivative = |point: &Sample| onto_tar.jacobian(point.place) * point.derivative;
+                    Samples::OnTar {
+                        derivatives: points.iter().map(derivative).collect(),
+                        in_front: points.iter().filter(in_front).map(|point| onto_ref.apply(point.place)).collect(),
+                    }
                 }
             }
         };
         self.routes.iter().enumerate().map(of_photograph).collect()
     }
+}
+
+/// Where a pinhole would show points of a photograph, `step_px` apart, and how these places move with the photograph's own: homographies are of
+/// what pinholes show. Without those that no pinhole sees.
+fn straightened(input: &WarpInput<'_>, photograph: usize, step_px: f64) -> Vec<Sample> {
+    let frame = &input.frames[photograph];
+    let grid = GridMesh::regular(frame.width, frame.height, step_px);
+    let sample = |vertex| {
+        let pixel = grid.source(vertex);
+        let (place, derivative) = (input.straight(photograph, pixel), input.straight_jacobian(photograph, pixel)?);
+        place.iter().chain(&derivative).all(|value| value.is_finite()).then_some(Sample { place, derivative })
+    };
+    (0..grid.len()).filter_map(sample).collect()
 }
 
 /// Points of a photograph, in order.
@@ -107,7 +122,7 @@ pub(super) enum Samples {
     },
 }
 
-/// A place of a photograph on the plane of `ref`, and the derivative there.
+/// A place of a photograph on a plane, and the derivative there by the photograph's own.
 #[derive(Debug)]
 pub(super) struct Sample {
     pub place: Vector2<f64>,

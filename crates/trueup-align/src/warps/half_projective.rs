@@ -204,6 +204,7 @@ mod tests {
     use super::*;
     use trueup_core::camera::Camera;
     use trueup_core::geometry::{rotation_about_y, rotation_about_z};
+    use trueup_core::lens::{LensTerms, PlacedLens};
 
     const MODELS: [WarpModel; 2] = [WarpModel::Sphp, WarpModel::SphpFree];
 
@@ -231,6 +232,34 @@ mod tests {
         let planes = HalfPlanes::new(&input, &onto_source, source, target).expect("two planes");
         let (_, warp) = least_distorted(&planes, &input, zero_rotation, FINE).expect("a narrow set");
         (planes, warp)
+    }
+
+    /// Warps are judged by where pinholes would show the photographs, as they are placed: behind a lens they come out as those of pinholes, but for the
+    /// points that the photographs have.
+    #[test]
+    fn samples_of_a_photograph_behind_a_lens_lie_where_it_is_placed() {
+        let terms = LensTerms { radial: [-0.1, 0.0, 0.0, 0.0], ..LensTerms::default() };
+        let lens = PlacedLens { terms, center_px: [0.0; 2] };
+        let pinholes = Example::panned(&[-20.0, 0.0, 20.0], 1).cameras;
+        let bent = Example::new(pinholes.into_iter().map(|camera| camera.through(&lens)).collect(), 1);
+        let (planes, warp) = searched(&bent, 2, 0, true);
+        let input = bent.input();
+        let step_px = 100.0;
+        let grid = GridMesh::regular(WIDTH, HEIGHT, step_px);
+        for (photograph, samples) in planes.sampled(&input, step_px).iter().enumerate() {
+            let (Route::ThroughRef(onto_ref), Samples::ThroughRef(samples)) = (&planes.routes[photograph], samples)
+            else {
+                panic!("all lie in front of both planes")
+            };
+            let place = |pixel: Vector2<f64>| onto_ref.apply(input.straight(photograph, pixel));
+            for (vertex, sample) in samples.iter().enumerate() {
+                let pixel = grid.source(vertex);
+                let along = (place(pixel + Vector2::x() * 0.01) - place(pixel - Vector2::x() * 0.01)) / 0.02;
+                assert!((sample.place - place(pixel)).norm() < 1e-9);
+                assert!((sample.derivative.column(0) - along).norm() < 1e-4, "{photograph} {pixel}");
+            }
+        }
+        assert!(matches!(warp, Warp::Halves(_)));
     }
 
     /// Value and derivative of the whole map of a photograph have no jump anywhere.

@@ -1,6 +1,6 @@
 //! What warp models are made from.
 
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::{Matrix2, Matrix3, Vector2};
 use trueup_core::camera::Camera;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
@@ -58,6 +58,20 @@ impl WarpInput<'_> {
             true => bearing.xy() / bearing.z * camera.focal_px + Vector2::from(camera.principal_point),
             false => Vector2::repeat(f64::NAN),
         }
+    }
+
+    /// How [`Self::straight`] moves with the pixel; `None` for what no pinhole sees.
+    pub(super) fn straight_jacobian(&self, photograph: usize, pixel: Vector2<f64>) -> Option<Matrix2<f64>> {
+        let camera = &self.cameras[photograph];
+        if camera.lens.is_pinhole() {
+            return Some(Matrix2::identity());
+        }
+        let bearing = camera.bearing(pixel);
+        let by_pixel = camera.projection_derivatives(bearing)?.bearing_by_pixel().filter(|_| bearing.z > 0.0)?;
+        // Of x / z and y / z.
+        let aside = bearing.xy() / bearing.z;
+        let by_pixel = by_pixel.fixed_rows::<2>(0) - aside * by_pixel.fixed_rows::<1>(2);
+        Some(by_pixel * (camera.focal_px / bearing.z))
     }
 
     /// Refuses lists that do not fit each other.

@@ -1,6 +1,6 @@
 //! Photographs with exactly known cameras, and what holds for every model.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix2, Matrix3};
 use trueup_core::Error;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_y;
@@ -175,6 +175,26 @@ fn homographies_behind_a_lens_meet() {
         };
         let farthest = bent.pairs.iter().map(apart).fold(0.0, f64::max);
         assert!(farthest < 0.5, "{model:?}: {farthest}");
+    }
+}
+
+/// The derivative of the places where a pinhole would show the pixels of a photograph, against differences; a pinhole's own stay.
+#[test]
+fn straightening_moves_as_its_derivative_says() {
+    let terms = LensTerms { radial: [-0.1, 0.02, 0.0, 0.0], ..LensTerms::default() };
+    let lens = PlacedLens { terms, center_px: [12.0, -7.0] };
+    let cameras = Example::panned(&[0.0, 20.0], 0).cameras;
+    let bent = Example::new(vec![cameras[0], cameras[1].through(&lens)], 0);
+    let input = bent.input();
+    for pixel in [[0.0, 0.0], [400.0, 300.0], [790.0, 20.0], [100.0, 580.0]].map(Vector2::from) {
+        assert_eq!(input.straight_jacobian(0, pixel), Some(Matrix2::identity()));
+        let jacobian = input.straight_jacobian(1, pixel).expect("seen");
+        for axis in 0..2 {
+            let mut step = Vector2::zeros();
+            step[axis] = 1e-3;
+            let difference = (input.straight(1, pixel + step) - input.straight(1, pixel - step)) / 2e-3;
+            assert!((jacobian.column(axis) - difference).norm() < 1e-6, "{pixel} {axis}: {jacobian} {difference}");
+        }
     }
 }
 
