@@ -78,7 +78,7 @@ impl FromStr for MemoryBudget {
         let unit = UNITS.iter().find(|(name, _)| *name == unit);
         match (number, unit) {
             // The cast saturates.
-            (Some(number), Some((_, bytes))) => Ok(Self::Bytes((number * bytes) as u64)),
+            (Some(number), Some((_, bytes))) => Ok(Self::Bytes((number * bytes).round() as u64)),
             _ => Err(format!("\"{text}\" is no amount of memory; write auto, or one such as 2GB or 512MB")),
         }
     }
@@ -140,7 +140,8 @@ mod tests {
 
     #[test]
     fn what_is_shown_can_be_read_again() {
-        for budget in [MemoryBudget::Auto, MemoryBudget::Bytes(1_234_567_000), MemoryBudget::Bytes(7)] {
+        let bytes = [1_234_567_000, 1_181_116_006, 7].map(MemoryBudget::Bytes);
+        for budget in bytes.into_iter().chain([MemoryBudget::Auto]) {
             assert_eq!(budget.to_string().parse(), Ok(budget));
         }
     }

@@ -29,8 +29,8 @@ trueup_core::options! {
         max_growth: f64 = 8.0, between(1.0, 1e6), "";
         /// What of the canvas is kept. Choose `none` for all that the photographs show, with ragged borders.
         crop: Crop = Crop::Auto, Allowed::Any, "", basic;
-        /// Share of the covered pixels that `crop = auto` must be able to keep; otherwise it keeps all, ragged borders as well. Lower
-        /// it if ragged borders are kept that you would rather lose.
+        /// Share of the covered pixels that `crop = auto` must be able to keep. Otherwise it takes the largest rectangle without holes, and where that
+        /// keeps less as well, all, ragged borders too. Lower it if ragged borders are kept that you would rather lose.
         min_kept: f64 = 0.6, between(0.0, 1.0), "";
         /// Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled as
         /// what lies beside them goes on. 0 fills nothing; raise it to 0.1 where ragged borders lie in a sky, a lawn or a wall, in

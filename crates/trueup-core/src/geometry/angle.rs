@@ -4,7 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 /// The angle in [-pi, pi) that differs from `angle` by whole turns.
 pub fn wrap_angle(angle: f64) -> f64 {
-    (angle + PI).rem_euclid(TAU) - PI
+    // The remainder of what is hardly negative is rounded to a whole turn.
+    let wrapped = (angle + PI).rem_euclid(TAU) - PI;
+    if wrapped < PI { wrapped } else { -PI }
 }
 
 /// The shortest of the lengths that differ from `length` by whole periods; itself without a period.
@@ -30,6 +32,7 @@ mod tests {
     fn wrapping_keeps_the_half_open_range() {
         assert_eq!(wrap_angle(PI), -PI);
         assert_eq!(wrap_angle(-PI), -PI);
+        assert_eq!(wrap_angle((-PI).next_down()), -PI);
         assert!((wrap_angle(3.0 * PI + 0.1) - (0.1 - PI)).abs() < 1e-12);
     }
 
