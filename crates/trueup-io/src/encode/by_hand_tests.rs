@@ -11,6 +11,8 @@ use super::failure::WriteFailure;
 use super::format_tests::{Fine, pages, sixteen};
 use super::tests::FullDisk;
 use super::*;
+use crate::provenance::of_maker;
+use crate::source::is_own_panorama;
 
 /// Two layers on a panorama of 400 x 300 pixels.
 struct TwoLayers;
@@ -37,8 +39,8 @@ fn layers_are_pages_with_a_place() {
     let path = folder.path().join("layers.tif");
     for layer_extent in [LayerExtent::Canvas, LayerExtent::Cropped] {
         let options = OutputOptions { layer_extent, depth: Depth::Sixteen, ..OutputOptions::default() };
-        let bytes =
-            write_layers(&path, &TwoLayers, &Metadata::default(), &options, &StageContext::default()).expect("written");
+        let bytes = write_layers(&path, &TwoLayers, &of_maker(MetadataKept::Keep), &options, &StageContext::default())
+            .expect("written");
         assert_eq!(bytes, path.metadata().expect("a file").len());
         let mut file = pages(&path);
         for (index, [left, top]) in [[10, 20], [150, 200]].into_iter().enumerate() {
@@ -70,9 +72,12 @@ fn layers_are_pages_with_a_place() {
             let mut numbers = numbers;
             assert_eq!((numbers(33300), numbers(33301)), (vec![400], vec![300]));
             assert_eq!(numbers(297), [index as u32, 2]);
+            let software = file.get_tag_ascii_string(Tag::Software).expect("a maker");
+            assert_eq!(software, crate::provenance::SOFTWARE);
             assert_eq!([place(&mut file, 286), place(&mut file, 287)], corner.map(f64::from));
         }
         assert!(!file.more_images());
+        assert!(is_own_panorama(&path), "it is known by its maker");
         let bytes = std::fs::read(&path).expect("a file");
         assert!(bytes.windows(10).any(|some| some == "Übung.tif".as_bytes()));
     }
@@ -112,8 +117,15 @@ fn labels_are_the_samples() {
     let folder = TempDir::new().expect("a temporary folder");
     let path = folder.path().join("seams.png");
     for photographs in [3, 255, 300] {
-        write_labels(&path, &Stripes(photographs), &OutputOptions::default(), &StageContext::default())
-            .expect("written");
+        write_labels(
+            &path,
+            &Stripes(photographs),
+            &of_maker(MetadataKept::Keep),
+            &OutputOptions::default(),
+            &StageContext::default(),
+        )
+        .expect("written");
+        assert!(is_own_panorama(&path), "it is known by its maker");
         let mut decoder = png::Decoder::new(BufReader::new(File::open(&path).expect("a file")));
         decoder.set_transformations(png::Transformations::IDENTITY);
         let mut reader = decoder.read_info().expect("a PNG");
@@ -142,6 +154,7 @@ fn labels_are_the_samples() {
     let failed = labels::write_map(
         &mut FullDisk { position: 0, room: 50 },
         &Stripes(300),
+        &Metadata::default(),
         &OutputOptions::default(),
         &StageContext::default(),
     );

@@ -3,12 +3,13 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use png::{BitDepth, ColorType, Encoder};
+use png::{BitDepth, ColorType, Encoder, Info};
 use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
 
 use super::destination::check_sides;
 use super::failure::WriteFailure;
+use super::metadata::Metadata;
 use super::options::OutputOptions;
 use super::pending::{PendingFile, check_place};
 use super::place::is_standard_output;
@@ -52,18 +53,24 @@ pub fn check_labels_place(path: &Path) -> Result<()> {
 /// Writes labels to a PNG at `path`; returns its length in bytes.
 ///
 /// Up to 255 photographs are indices into a palette of distinct colors, of which index 0 is transparent; more are 16-bit
-/// gray. Either way the samples are the labels, and text chunks `Photograph N` hold the names. The file appears complete or
-/// not at all.
+/// gray. Either way the samples are the labels, and text chunks `Photograph N` hold the names. Of `metadata`, the file has the EXIF. It
+/// appears complete or not at all.
 ///
 /// # Errors
 /// Those of [`write()`](super::write()), and of [`LabelMap::row`].
-pub fn write_labels(path: &Path, map: &dyn LabelMap, options: &OutputOptions, context: &StageContext) -> Result<u64> {
+pub fn write_labels(
+    path: &Path,
+    map: &dyn LabelMap,
+    metadata: &Metadata,
+    options: &OutputOptions,
+    context: &StageContext,
+) -> Result<u64> {
     options.check()?;
     check_labels_place(path)?;
     let [width, height] = map.size();
     check_sides(path, SIDES, width, height)?;
     let mut pending = PendingFile::create(path)?;
-    write_map(pending.file(), map, options, context).map_err(|failure| failure.at(&pending.place()))?;
+    write_map(pending.file(), map, metadata, options, context).map_err(|failure| failure.at(&pending.place()))?;
     context.check_cancelled()?;
     pending.commit()
 }
@@ -71,13 +78,16 @@ pub fn write_labels(path: &Path, map: &dyn LabelMap, options: &OutputOptions, co
 pub(super) fn write_map(
     file: &mut dyn Output,
     map: &dyn LabelMap,
+    metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext<'_>,
 ) -> std::result::Result<(), WriteFailure> {
     let names = map.names();
     let [width, height] = map.size();
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
-    let mut encoder = Encoder::new(&mut output as &mut dyn Write, width as u32, height as u32);
+    let mut info = Info::with_size(width as u32, height as u32);
+    info.exif_metadata = metadata.exif.as_ref().map(|exif| exif.into());
+    let mut encoder = Encoder::with_info(&mut output as &mut dyn Write, info).map_err(failure)?;
     let indexed = names.len() <= PALETTE;
     if indexed {
         encoder.set_color(ColorType::Indexed);

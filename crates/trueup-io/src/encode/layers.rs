@@ -68,7 +68,7 @@ pub fn check_layers_place(path: &Path) -> Result<()> {
 ///
 /// Every page has alpha, the name of its layer, its number, and its place in the panorama (XPosition, YPosition at 72
 /// pixels an inch; ImageFullWidth, ImageFullLength). [`OutputOptions::layer_extent`] decides whether it is as large as the
-/// panorama. Of `metadata`, the pages have the color profile. The file appears complete or not at all.
+/// panorama. Every page has all of `metadata`, whose EXIF is to say nothing of sizes and places. The file appears complete or not at all.
 ///
 /// # Errors
 /// Those of [`write()`](crate::encode::write()), and of [`LayerSet::open`].
@@ -123,7 +123,7 @@ fn write_each(
     let whole = set.whole();
     let converted = metadata.profile_to_leave(options, options.depth == Depth::Float);
     let icc = metadata.icc.clone().filter(|_| converted.is_none());
-    let metadata = Metadata { icc, ..Metadata::default() };
+    let metadata = Metadata { icc, ..metadata.clone() };
     for index in 0..set.count() {
         context.check_cancelled()?;
         let page = set.open(index)?;

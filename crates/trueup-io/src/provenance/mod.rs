@@ -1,4 +1,4 @@
-//! What a panorama tells of the photographs it is made of: EXIF and XMP.
+//! What a panorama tells of the photographs it is made of: EXIF and XMP; and what is written beside it, of its maker ([`of_maker`]).
 //!
 //! [`describe`] gathers it from the files. Of the reference photograph come camera, lens and exposure; the time is that of
 //! the earliest photograph, and the place the reference's, or that of the first photograph that knows it.
@@ -82,6 +82,17 @@ pub fn describe(panorama: &PanoramaDescription<'_>, kept: MetadataKept) -> Metad
     };
     let xmp = gpano::packet(panorama, panorama.spherical.as_ref(), &facts);
     Metadata { exif: record::block(&fields), icc: None, xmp }
+}
+
+/// The metadata of a picture that is written beside a panorama and is none itself (layers, seams), but for its color profile: that this
+/// program made it, so that a later run does not take it for a photograph.
+pub fn of_maker(kept: MetadataKept) -> Metadata {
+    match kept {
+        MetadataKept::None => Metadata::default(),
+        MetadataKept::Keep | MetadataKept::NoLocation => {
+            Metadata { exif: record::maker_block(), ..Metadata::default() }
+        }
+    }
 }
 
 /// Compass heading of the levelled world's z axis: what the photographs' compasses say, each less its own direction in

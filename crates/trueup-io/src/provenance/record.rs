@@ -97,7 +97,6 @@ pub(super) fn fields(
     let mut fields: Vec<Field> = camera.chain(place).filter(short_enough).cloned().collect();
 
     let mut add = |tag, value| fields.push(Field { tag, ifd_num: In::PRIMARY, value });
-    let ascii = |text: &str| Value::Ascii(vec![text.as_bytes().to_vec()]);
     add(Tag::Software, ascii(SOFTWARE));
     add(Tag::Orientation, Value::Short(vec![1]));
     add(Tag::ExifVersion, Value::Undefined(VERSION.to_vec(), 0));
@@ -126,6 +125,15 @@ pub(super) fn fields(
         }
     }
     fields
+}
+
+fn ascii(text: &str) -> Value {
+    Value::Ascii(vec![text.as_bytes().to_vec()])
+}
+
+/// The block that names this program as the maker, and nothing else.
+pub(super) fn maker_block() -> Option<Vec<u8>> {
+    block(&[Field { tag: Tag::Software, ifd_num: In::PRIMARY, value: ascii(SOFTWARE) }])
 }
 
 /// The block of these fields; `None` if they cannot be written.

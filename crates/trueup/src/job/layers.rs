@@ -6,7 +6,8 @@ use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::{self, Rendered};
 use trueup_compose::seam::{NOBODY, Seams};
 use trueup_core::{Error, Result};
-use trueup_io::encode::{self, LabelMap, LayerPage, LayerSet, OutputOptions};
+use trueup_io::encode::{self, LabelMap, LayerPage, LayerSet, Metadata, OutputOptions};
+use trueup_io::provenance;
 
 use crate::pipeline::{Alignment, Stitcher};
 
@@ -49,7 +50,8 @@ impl Stitcher<'_> {
         let layout = alignment.kept_layout();
         let shown = shown(&layout);
         let layers = Layers { stitcher: self, alignment, layout, shown };
-        encode::write_layers(path, &layers, &self.metadata(alignment), &options, self.context())
+        let metadata = Metadata { icc: self.metadata(alignment).icc, ..provenance::of_maker(options.metadata) };
+        encode::write_layers(path, &layers, &metadata, &options, self.context())
     }
 
     /// Writes which photograph what was `rendered`, composed of `alignment`, shows at every pixel to a PNG; returns its length in
@@ -60,7 +62,8 @@ impl Stitcher<'_> {
     pub fn write_seams(&self, alignment: &Alignment, rendered: &Rendered, path: &Path) -> Result<u64> {
         let seams = rendered.seams.as_ref().ok_or_else(no_seams)?;
         let labels = Labels { alignment, seams };
-        encode::write_labels(path, &labels, &self.options().compose.output, self.context())
+        let options = &self.options().compose.output;
+        encode::write_labels(path, &labels, &provenance::of_maker(options.metadata), options, self.context())
     }
 }
 
