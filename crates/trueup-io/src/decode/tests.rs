@@ -183,6 +183,47 @@ fn every_kind_of_jpeg_is_decoded_but_none_that_is_cut_off() {
     }
 }
 
+/// Codes after lost or replaced bytes are most often decodable as others.
+#[test]
+fn a_jpeg_whose_data_were_replaced_or_lost_is_damaged() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let (width, height) = (256_u16, 192_u16);
+    let mut seed = 7_u32;
+    let mut noise = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (seed >> 24) as u8 / 4
+    };
+    let levels: Vec<u8> =
+        (0..usize::from(width) * usize::from(height) * 3).map(|sample| (sample / 3 % 192) as u8 + noise()).collect();
+    for progressive in [false, true] {
+        let mut whole = Vec::new();
+        let mut encoder = jpeg_encoder::Encoder::new(&mut whole, 90);
+        encoder.set_progressive(progressive);
+        encoder.encode(&levels, width, height, jpeg_encoder::ColorType::Rgb).expect("encoding to memory");
+        let source = examine(write(&folder, "picture.jpg", &whole));
+        photograph(&source).expect("whole");
+        // What is filled up between the data and the end is nothing that was lost.
+        let mut filled = whole.clone();
+        filled.splice(whole.len() - 2..whole.len() - 2, [0; 512]);
+        write(&folder, "picture.jpg", &filled);
+        assert!(photograph(&source).is_ok(), "{progressive}");
+        let from = whole.len() / 4;
+        let mut replaced = whole.clone();
+        replaced[from..from + 1024].fill(0);
+        let mut lost = whole.clone();
+        lost.drain(from..from + 1024);
+        for damaged in [replaced, lost] {
+            write(&folder, "picture.jpg", &damaged);
+            let refused = photograph(&source);
+            // Of several scans, what ends too soon within one is not told.
+            if !progressive {
+                let error = refused.expect_err("damaged").to_string();
+                assert!(error.starts_with("picture.jpg: ") && error.contains("damaged"), "{error}");
+            }
+        }
+    }
+}
+
 /// Bytes of zeros where a file ends, whose room was taken before it was written, are no picture.
 #[test]
 fn a_jpeg_that_ends_in_nothing_is_cut_off() {

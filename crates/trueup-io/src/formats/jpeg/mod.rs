@@ -4,6 +4,7 @@ mod read;
 mod reduced;
 mod scans;
 mod segments;
+mod watched;
 pub(super) mod write;
 
 use crate::encode::options::Depth;

@@ -5,12 +5,14 @@ use std::io::{Read, Seek};
 use trueup_core::raster::{Photograph, Raster};
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
-use zune_core::bytestream::ZCursor;
+use zune_core::bytestream::{ZByteIoError, ZCursor};
 use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
+use zune_jpeg::errors::DecodeErrors;
 
-use super::scans::{has_end_of_image, has_separate_subsampled_scans, is_one_scan};
+use super::scans::{end_of_image, has_separate_subsampled_scans, is_one_scan};
+use super::watched::{Watch, WatchedBytes};
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::decoded::{MAX_PIXEL_BYTES, check_unchanged, damaged};
 use crate::metadata::embedded;
@@ -33,7 +35,7 @@ fn pixel_options() -> DecoderOptions {
 /// What the header states of the pixels.
 pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
     let mut decoder = JpegDecoder::new_with_options(input, header_options());
-    decoder.decode_headers().map_err(|error| HeaderError::Damaged(format!("{error:?}")))?;
+    decoder.decode_headers().map_err(|error| HeaderError::Damaged(words(&error)))?;
     let (width, height) = decoder.dimensions().ok_or_else(|| HeaderError::damaged("no frame header"))?;
     Ok(StoredPixels { width, height, bits: 8, is_float: false })
 }
@@ -71,28 +73,80 @@ pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograp
 
 pub(super) fn decode(source: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), header_options());
-    decoder.decode_headers().map_err(|error| damaged(source, format!("{error:?}")))?;
+    decoder.decode_headers().map_err(|error| undecodable(source, &error))?;
     let (width, height) = decoder.dimensions().ok_or_else(|| damaged(source, "no frame header"))?;
     check_unchanged(source, width, height)?;
-    if !has_end_of_image(bytes) {
+    let Some(end) = end_of_image(bytes) else {
         return whole_without_end(source, bytes).ok_or_else(|| {
             Error::input(
                 &source.name,
                 "the photograph is cut off: the JPEG ends before its end-of-image marker",
-                "Copy it again from the camera or leave it out.",
+                COPY_AGAIN,
             )
         });
-    }
+    };
     if has_separate_subsampled_scans(bytes) {
         return decode_separate_scans(source, bytes, width, height);
     }
+    // Scans of several end at markers that decoders look for.
+    let (coded, behind) = if is_one_scan(bytes) { (&bytes[..end], &BEYOND[..]) } else { (bytes, &[][..]) };
+    decode_followed(source, coded, behind)
+}
+
+/// What people can do of a file that was damaged on its way.
+const COPY_AGAIN: &str = "Copy it again from the camera or leave it out.";
+
+/// What is decoded where data end too soon: more bytes than decoders hold ahead, then the end-of-image marker.
+const BEYOND: [u8; 66] = {
+    let mut bytes = [0x55; 66];
+    bytes[64] = 0xff;
+    bytes[65] = 0xd9;
+    bytes
+};
+
+/// Decodes `coded` as if `behind` followed.
+///
+/// Where bytes were lost or replaced, codes after them are most often decodable as others, and what tells is that data are left over or
+/// missing in the end.
+///
+/// # Departures
+/// Strict decoding of zune-jpeg 0.5.15 accepts both.
+fn decode_followed(source: &SourceImage, coded: &[u8], behind: &[u8]) -> Result<Photograph> {
+    let watch = Watch::default();
+    let mut decoder = JpegDecoder::new_with_options(WatchedBytes::new(coded, behind, &watch), header_options());
+    decoder.decode_headers().map_err(|error| undecodable(source, &error))?;
+    watch.restart();
+    let (width, height) = decoder.dimensions().ok_or_else(|| damaged(source, "no frame header"))?;
     let (space, channels) = match decoder.input_colorspace() {
         Some(ColorSpace::Luma) => (ColorSpace::Luma, 1),
         _ => (ColorSpace::RGB, 3),
     };
     decoder.set_options(pixel_options().jpeg_set_out_colorspace(space));
-    let pixels = decoder.decode().map_err(|error| damaged(source, format!("{error:?}")))?;
+    let pixels = decoder.decode().map_err(|error| undecodable(source, &error))?;
+    let broken =
+        |reason: &str| Err(Error::input(&source.name, format!("the photograph is damaged: {reason}"), COPY_AGAIN));
+    if watch.has_passed_data() {
+        return broken("its data go on where its pixels are complete");
+    }
+    if behind == BEYOND && watch.has_decoded_beyond(coded.len()) {
+        return broken("its data end before its pixels do");
+    }
     Ok(Photograph::Eight(Raster::from_data(width, height, channels, pixels)?))
+}
+
+/// Why the pixels of a photograph cannot be decoded.
+fn undecodable(source: &SourceImage, error: &DecodeErrors) -> Error {
+    damaged(source, words(error))
+}
+
+/// The decoder's own words in one line.
+fn words(error: &DecodeErrors) -> String {
+    match error {
+        DecodeErrors::ExhaustedData | DecodeErrors::IoErrors(ZByteIoError::NotEnoughBytes(..)) => {
+            "the file ends within it".to_owned()
+        }
+        other => format!("{other:?}").split_whitespace().collect::<Vec<_>>().join(" "),
+    }
 }
 
 /// A JPEG that lacks nothing but its end-of-image marker, as programs leave it that are stopped while they write; `None` if pixels are missing.
@@ -114,7 +168,10 @@ fn whole_without_end(source: &SourceImage, bytes: &[u8]) -> Option<Photograph> {
     if !is_one_scan(bytes) || coded.ends_with(&EMPTY) {
         return None;
     }
-    let continued = |byte: u8| decode(source, &[coded, &[byte; CONTINUED_BYTES], &[0xff, 0xd9]].concat()).ok();
+    let continued = |byte: u8| {
+        let behind = [&[byte; CONTINUED_BYTES][..], &[0xff, 0xd9]].concat();
+        decode_followed(source, coded, &behind).ok()
+    };
     let [first, others @ ..] = CONTINUATIONS;
     let photograph = continued(first)?;
     others.into_iter().all(|byte| continued(byte).as_ref() == Some(&photograph)).then_some(photograph)

@@ -31,15 +31,16 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
     })
 }
 
-/// Whether an end-of-image marker follows the first scan header. The thumbnail's own marker lies before that, in EXIF;
+/// Where the end-of-image marker is that follows the first scan header; `None` without one. The thumbnail's own marker lies before that, in EXIF;
 /// within a scan every 0xff of the data is followed by 0 or by a restart marker; and further pictures or maker data may
 /// follow the end.
 ///
 /// # Source
 /// ITU-T T.81 B.1.1.2 to B.1.1.5.
-pub(super) fn has_end_of_image(bytes: &[u8]) -> bool {
-    let scan = segments(bytes).find(|&(marker, _)| marker == START_OF_SCAN);
-    scan.is_some_and(|(_, scan)| scan.windows(2).any(|pair| pair == [0xff, END_OF_IMAGE]))
+pub(super) fn end_of_image(bytes: &[u8]) -> Option<usize> {
+    let (_, scan) = segments(bytes).find(|&(marker, _)| marker == START_OF_SCAN)?;
+    let place = scan.windows(2).position(|pair| pair == [0xff, END_OF_IMAGE])?;
+    Some(bytes.len() - scan.len() + place)
 }
 
 /// Whether a sequential JPEG has components of different resolution and not all of them in its first scan.
