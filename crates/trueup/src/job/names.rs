@@ -5,19 +5,34 @@ use trueup_core::{Error, Result};
 
 /// The photograph that a user calls `name`: by name, by path, or by the end of its path, its own or that of another exposure of its
 /// stack; `role` ends the message if there is none, as in "so it cannot be the reference".
+///
+/// # Errors
+/// [`Error::Input`] if there is none, or if it may be any of several.
 pub(crate) fn photograph_named(images: &[SourceImage], name: &str, role: &str) -> Result<usize> {
-    let position = |called: &dyn Fn(&SourceImage) -> bool| {
-        let is_called = |image: &SourceImage| called(image) || image.stack.iter().any(|member| called(&member.source));
-        images.iter().position(is_called)
+    let called = |is_called: &dyn Fn(&SourceImage) -> bool| -> Vec<usize> {
+        let any = |image: &SourceImage| is_called(image) || image.stack.iter().any(|member| is_called(&member.source));
+        (0..images.len()).filter(|&index| any(&images[index])).collect()
     };
-    let exactly = position(&|image| image.name == name || image.path.as_os_str() == name);
-    exactly.or_else(|| position(&|image| image.path.ends_with(name))).ok_or_else(|| {
-        Error::input(
+    let exactly = called(&|image| image.name == name || image.path.as_os_str() == name);
+    if let Some(&found) = exactly.first() {
+        return Ok(found);
+    }
+    match called(&|image| image.path.ends_with(name))[..] {
+        [] => Err(Error::input(
             name,
             format!("no photograph of this name was given, {role}"),
             "Write the name of one of the photographs, with its extension.",
-        )
-    })
+        )),
+        [found] => Ok(found),
+        ref several => {
+            let paths: Vec<String> = several.iter().map(|&index| images[index].path.display().to_string()).collect();
+            Err(Error::input(
+                name,
+                format!("it may be any of {}", paths.join(", ")),
+                "Write the folder before the name, as far as tells the photographs apart.",
+            ))
+        }
+    }
 }
 
 /// The photograph the user calls `name` for the reference: by name, by path, or by the end of its path.
@@ -26,4 +41,22 @@ pub(crate) fn photograph_named(images: &[SourceImage], name: &str, role: &str) -
 /// As [`photograph_named`].
 pub(crate) fn reference_named(images: &[SourceImage], name: &str) -> Result<usize> {
     photograph_named(images, name, "so it cannot be the reference")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_of_several_photographs_is_none_of_one() {
+        let image = |path: &str| SourceImage::unknown(path, path, [8, 6]);
+        let images = ["to/d1/a.jpg", "to/d2/a.jpg", "to/d2/b.jpg"].map(image);
+        let named = |name: &str| photograph_named(&images, name, "so it is not");
+        assert_eq!(named("d2/a.jpg").expect("one"), 1);
+        assert_eq!(named("to/d1/a.jpg").expect("one"), 0);
+        assert_eq!(named("b.jpg").expect("one"), 2);
+        let message = named("a.jpg").expect_err("of two").to_string();
+        assert!(message.contains("a.jpg: it may be any of to/d1/a.jpg, to/d2/a.jpg. Write the folder"), "{message}");
+        assert!(named("c.jpg").is_err());
+    }
 }
