@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use trueup_core::memory::{bytes_in_words, check_room};
+use trueup_core::memory::{check_room, needed_in_words, room_in_words};
 use trueup_core::scratch::{ScratchFile, ScratchSpace};
 use trueup_core::source::PhotographSource;
 use trueup_core::{Error, Result};
@@ -186,7 +186,7 @@ impl MemoryNeeds {
 
     fn refusal(&self, allowed: usize) -> Error {
         let photographs = self.at_one_place.saturating_add(DECODING * self.largest);
-        let words = |bytes: usize| bytes_in_words(bytes as u64);
+        let words = |bytes: usize| needed_in_words(bytes as u64);
         let [width, height] = self.size;
         Error::Limits {
             subject: format!("composing {width} x {height} px"),
@@ -197,7 +197,7 @@ impl MemoryNeeds {
                 words(self.largest),
                 words(self.least() - photographs)
             ),
-            allowed: words(allowed),
+            allowed: room_in_words(allowed as u64),
             hint: "Raise --memory (resources.memory) by the difference, or make a smaller panorama (--scale)."
                 .to_owned(),
         }

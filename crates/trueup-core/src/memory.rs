@@ -22,7 +22,7 @@ const UNITS: [(&str, f64); 9] = [
 ];
 
 /// A number of bytes for people: `750 MB`, `8.1 GB`.
-pub fn bytes_in_words(bytes: u64) -> String {
+fn bytes_in_words(bytes: u64) -> String {
     let bytes = bytes as f64;
     // What would round to a thousand of a unit is one of the next.
     const NEXT_UNIT: f64 = 999.5;
@@ -32,6 +32,25 @@ pub fn bytes_in_words(bytes: u64) -> String {
         format!("{:.0} MB", bytes / 1e6)
     } else {
         format!("{:.0} kB", (bytes / 1e3).ceil())
+    }
+}
+
+/// A number of bytes that are needed, for people: rounded up, so that as many as are named are enough.
+pub fn needed_in_words(bytes: u64) -> String {
+    bytes_in_words(bytes.checked_next_multiple_of(digit_bytes(bytes)).unwrap_or(bytes))
+}
+
+/// A number of bytes that there are, for people: rounded down, so that no more are named, and fewer than [`needed_in_words`] of more.
+pub fn room_in_words(bytes: u64) -> String {
+    bytes_in_words(bytes - bytes % digit_bytes(bytes))
+}
+
+/// What the last digit that is shown of so many bytes stands for.
+fn digit_bytes(bytes: u64) -> u64 {
+    match bytes {
+        1_000_000_000.. => 100_000_000,
+        1_000_000.. => 1_000_000,
+        _ => 1_000,
     }
 }
 
@@ -47,7 +66,7 @@ pub fn check_room(subject: impl fmt::Display, bytes: usize) -> Result<()> {
     drop(std::hint::black_box(room));
     taken.map_err(|_| Error::Limits {
         subject: subject.to_string(),
-        needed: format!("{} of memory", bytes_in_words(bytes as u64)),
+        needed: format!("{} of memory", needed_in_words(bytes as u64)),
         allowed: "less than that".to_owned(),
         hint: "Raise the limit of the shell or the container (ulimit -v), or give smaller photographs.".to_owned(),
     })
@@ -153,6 +172,27 @@ mod tests {
         for bytes in [usize::MAX, usize::MAX >> 2] {
             let refused = check_room("decoding a.jpg", bytes).expect_err("too much").to_string();
             assert!(refused.starts_with("decoding a.jpg: ") && refused.contains("less than that allowed"), "{refused}");
+        }
+    }
+
+    /// What is asked for is enough, and never what was given already.
+    #[test]
+    fn needs_are_rounded_up_and_room_is_rounded_down() {
+        let both = |bytes: u64| (needed_in_words(bytes), room_in_words(bytes));
+        let words = |needed: &str, room: &str| (needed.to_owned(), room.to_owned());
+        assert_eq!(both(212_600_000), words("213 MB", "212 MB"));
+        assert_eq!(both(213_000_000), words("213 MB", "213 MB"));
+        assert_eq!(both(1_940_000_001), words("2.0 GB", "1.9 GB"));
+        assert_eq!(both(999_400_000), words("1.0 GB", "999 MB"));
+        assert_eq!(both(1_001), words("2 kB", "1 kB"));
+        for bytes in (0..40).map(|power| 3_u64.pow(power) / 2) {
+            let parsed = |words: String| match words.parse() {
+                Ok(MemoryBudget::Bytes(bytes)) => bytes,
+                other => panic!("{words}: {other:?}"),
+            };
+            if bytes >= 1_000 {
+                assert!(parsed(needed_in_words(bytes)) >= bytes && parsed(room_in_words(bytes)) <= bytes, "{bytes}");
+            }
         }
     }
 

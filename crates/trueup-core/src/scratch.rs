@@ -38,7 +38,7 @@ impl ScratchSpace for NoScratch {
     fn create(&self, bytes: u64) -> Result<Box<dyn ScratchFile>> {
         Err(Error::Limits {
             subject: "scratch file".to_owned(),
-            needed: crate::memory::bytes_in_words(bytes),
+            needed: crate::memory::needed_in_words(bytes),
             allowed: "none".to_owned(),
             hint: "Allow more memory.".to_owned(),
         })

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use trueup_core::memory::bytes_in_words;
+use trueup_core::memory::{needed_in_words, room_in_words};
 use trueup_core::scratch::{ScratchFile, ScratchSpace};
 use trueup_core::{Error, Result};
 
@@ -71,8 +71,8 @@ pub fn check_room(folder: &Path, needed: u64, what: &str) -> Result<()> {
     match fs4::available_space(existing(folder)) {
         Ok(free) if free < needed => Err(Error::Limits {
             subject: format!("disk of {}", existing(folder).display()),
-            needed: format!("{} for {what}", bytes_in_words(needed)),
-            allowed: format!("{} free", bytes_in_words(free)),
+            needed: format!("{} for {what}", needed_in_words(needed)),
+            allowed: format!("{} free", room_in_words(free)),
             hint: "Free some room, choose another folder (--scratch for the scratch file), or make a smaller panorama \
                    (--scale)."
                 .to_owned(),

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
-use trueup_core::memory::bytes_in_words;
+use trueup_core::memory::{needed_in_words, room_in_words};
 use trueup_core::{Error, Result};
 
 use super::tile::BlendTile;
@@ -162,11 +162,11 @@ fn split(strip: &[usize], tiles: &[BlendTile], bytes: &[usize], room: Room, batc
 }
 
 fn too_many(count: usize, needed: usize, room: usize) -> Error {
-    let words = |bytes: usize| bytes_in_words(bytes as u64);
+    let words = |bytes: usize| needed_in_words(bytes as u64);
     Error::Limits {
         subject: format!("{count} photographs that meet at one place"),
         needed: format!("{} of memory for them", words(needed)),
-        allowed: words(room),
+        allowed: room_in_words(room as u64),
         hint: format!("Raise --memory (resources.memory) by {}.", words(needed - room)),
     }
 }

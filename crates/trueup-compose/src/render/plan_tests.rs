@@ -1,7 +1,7 @@
 //! How memory is divided for each way of composing.
 
 use trueup_core::Result;
-use trueup_core::memory::bytes_in_words;
+use trueup_core::memory::needed_in_words;
 use trueup_core::mesh::GridMesh;
 
 use super::*;
@@ -49,7 +49,7 @@ fn the_number_in_a_refusal_is_enough() {
         // Of photographs that were not decoded yet, of 48 MB each.
         let needs = memory_needs(&layout(20), &Memory(Vec::new()), &options);
         let least = needs.expect("few photographs").least();
-        assert!(refused.contains(&bytes_in_words(least as u64)), "{refused}");
+        assert!(refused.contains(&needed_in_words(least as u64)), "{refused}");
         assert!(plan(least, least, blend).is_ok() && plan(least, least - 1, blend).is_err());
     }
 }

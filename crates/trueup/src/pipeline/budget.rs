@@ -2,7 +2,7 @@
 //! once, never what comes out.
 
 use trueup_compose::render::Resources;
-use trueup_core::memory::{MemoryBudget, bytes_in_words};
+use trueup_core::memory::{MemoryBudget, needed_in_words, room_in_words};
 use trueup_core::scratch::ScratchSpace;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
@@ -118,11 +118,10 @@ impl Budget {
         let one = decoding.saturating_add(reduced).max(features);
         let least = one.saturating_add(PROGRAM_BYTES);
         if least > self.ceiling {
-            let words = |bytes: usize| bytes_in_words(bytes as u64);
             return Err(Error::Limits {
                 subject: format!("measuring {} ({} x {} px)", largest.name, largest.width, largest.height),
-                needed: format!("at least {} of memory", words(least)),
-                allowed: words(self.ceiling),
+                needed: format!("at least {} of memory", needed_in_words(least as u64)),
+                allowed: room_in_words(self.ceiling as u64),
                 hint: self.advice.to_owned(),
             });
         }
@@ -213,7 +212,7 @@ mod tests {
         };
         let message = refused("100MB").expect("too little");
         assert!(
-            message.contains("2.jpg (6000 x 4000 px): at least 290 MB of memory needed, 100 MB allowed"),
+            message.contains("2.jpg (6000 x 4000 px): at least 291 MB of memory needed, 100 MB allowed"),
             "{message}"
         );
         assert_eq!(refused("291MB"), None);
