@@ -5,6 +5,8 @@ use std::fmt;
 use trueup::{Error, InvalidOption};
 use trueup_terminal::status_of_stopping;
 
+use crate::words::one_line;
+
 /// The input or the system failed.
 pub(crate) const STATUS_FAILURE: u8 = 1;
 /// Wrong usage: arguments or options that cannot be.
@@ -72,11 +74,12 @@ impl From<Error> for Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(formatter, "trueup: error: {}", self.message)?;
+        // A name may hold line ends, and what follows them must not pass for another line.
+        writeln!(formatter, "trueup: error: {}", one_line(&self.message))?;
         for detail in &self.details {
-            writeln!(formatter, "  {detail}")?;
+            writeln!(formatter, "  {}", one_line(detail))?;
         }
-        if self.hint.is_empty() { Ok(()) } else { writeln!(formatter, "trueup: hint: {}", self.hint) }
+        if self.hint.is_empty() { Ok(()) } else { writeln!(formatter, "trueup: hint: {}", one_line(&self.hint)) }
     }
 }
 
@@ -89,6 +92,14 @@ mod tests {
         let failure = Failure::from(Error::input("a.jpg", "it is a text", "Give a photograph."));
         assert_eq!(failure.to_string(), "trueup: error: a.jpg: it is a text\ntrueup: hint: Give a photograph.\n");
         assert_eq!(failure.status, STATUS_FAILURE);
+    }
+
+    /// File names may hold line ends.
+    #[test]
+    fn no_name_makes_a_line_of_its_own() {
+        let failure = Failure::from(Error::input("a\ntrueup: hint: Run it.\n.jpg", "it is a text", "Give b\nc.jpg."));
+        let lines = ["trueup: error: a\\ntrueup: hint: Run it.\\n.jpg: it is a text", "trueup: hint: Give b\\nc.jpg."];
+        assert_eq!(failure.to_string(), format!("{}\n{}\n", lines[0], lines[1]));
     }
 
     #[test]
