@@ -41,6 +41,17 @@ pub struct Framing<'a> {
     pub options: &'a CanvasOptions,
     /// What becomes of the canvas, if that is decided.
     pub known: Option<&'a Frame>,
+    /// What judges the size of the frame before it is composed, if anything does.
+    pub check: Option<&'a dyn SizeCheck>,
+}
+
+/// What judges the size of a panorama before it is composed, as the format does that it is to be written in.
+pub trait SizeCheck: std::fmt::Debug {
+    /// Refuses a panorama of `size` pixels (width, height).
+    ///
+    /// # Errors
+    /// If it cannot be made use of.
+    fn check(&self, size: [usize; 2]) -> Result<()>;
 }
 
 impl Frame {
@@ -99,6 +110,12 @@ impl Framing<'_> {
         // A thing that ends in the picture is better than ragged borders; so is one that is cut.
         let of_things = with_tops.or(first).or_else(|| chosen(Filling::Ending)).map(|chosen| chosen.rectangle);
         self.frame(of_things.or_else(|| Some(self.largest(layout)).filter(is_enough)))
+    }
+
+    /// Refuses a frame on the canvas of `layout` whose size is not accepted.
+    pub(crate) fn check_size(&self, frame: &Frame, layout: &CanvasLayout) -> Result<()> {
+        let size = || frame.part_of([layout.width, layout.height]).size();
+        self.check.map_or(Ok(()), |check| check.check(size()))
     }
 
     fn frame(&self, rectangle: Option<Rectangle>) -> Frame {

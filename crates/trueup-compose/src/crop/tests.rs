@@ -70,7 +70,7 @@ fn kept_by(
     picture: impl Fn(usize, usize) -> u8 + Sync,
 ) -> Option<Rectangle> {
     let painted = Painted([layout.width, layout.height], picture);
-    let framing = Framing { coverage: &Coverage::of(layout), options: &options, known: None };
+    let framing = Framing { coverage: &Coverage::of(layout), options: &options, known: None, check: None };
     match framing.of_panorama(&painted, layout).expect("a picture in memory") {
         Frame::Whole => None,
         Frame::Part(kept) => Some(kept),

@@ -36,7 +36,7 @@ fn what_is_transparent_is_not_covered() {
     let corrections = Corrections::plain(2);
     let covered = Coverage::of(&layout);
     let canvas_options = CanvasOptions { crop: Crop::Rectangle, ..CanvasOptions::default() };
-    let framing = Framing { coverage: &covered, options: &canvas_options, known: None };
+    let framing = Framing { coverage: &covered, options: &canvas_options, known: None, check: None };
     let (seams, context) = (SeamOptions::default(), StageContext::default());
     for blend in [Blend::MultiBand, Blend::None, Blend::Feather, Blend::Average] {
         let options = RenderOptions { blend, ..RenderOptions::default() };

@@ -110,7 +110,7 @@ fn both(
     let input = RenderInput { layout, corrections: &corrections, photographs: &photographs };
     let coverage = Coverage::of(layout);
     let canvas = CanvasOptions { crop, ..CanvasOptions::default() };
-    let framing = Framing { coverage: &coverage, options: &canvas, known: None };
+    let framing = Framing { coverage: &coverage, options: &canvas, known: None, check: None };
     let helpers = Here { input, options, fault, regions: Mutex::default() };
     let rendered = |helpers: Option<&dyn RenderHelpers>| {
         let resources = Resources { memory, ceiling: usize::MAX, scratch: &RamDisk::default(), helpers };

@@ -5,7 +5,7 @@ use trueup_core::raster::{Photograph, RowSource};
 use super::within_tests::scene;
 use super::*;
 use crate::coverage::Coverage;
-use crate::crop::Crop;
+use crate::crop::{Crop, SizeCheck};
 use crate::layout::CanvasOptions;
 use crate::light::Corrections;
 use crate::test_photographs::{Memory, RamDisk, canvas, gradient, moved, noise};
@@ -18,7 +18,7 @@ fn framed_and_whole(
     memory: usize,
 ) -> [Rendered; 2] {
     let coverage = Coverage::of(input.layout);
-    let framing = Framing { coverage: &coverage, options, known };
+    let framing = Framing { coverage: &coverage, options, known, check: None };
     let (look, seams, context) = (RenderOptions::default(), SeamOptions::default(), StageContext::default());
     [Some(&framing), None].map(|framing| {
         let resources = Resources { memory, ceiling: usize::MAX, scratch: &RamDisk::default(), helpers: None };
@@ -29,7 +29,7 @@ fn framed_and_whole(
 /// All samples of what is kept of a canvas, its gaps filled.
 fn kept_samples(mut panorama: Panorama, layout: &CanvasLayout, options: &CanvasOptions, kept: &Rectangle) -> Vec<u16> {
     let coverage = Coverage::of(layout);
-    let framing = Framing { coverage: &coverage, options, known: None };
+    let framing = Framing { coverage: &coverage, options, known: None, check: None };
     if let Some(gaps) = framing.gaps(layout, kept) {
         assert!(panorama.fill(&gaps, &StageContext::default()).expect("room") > 0);
     }
@@ -91,7 +91,7 @@ fn the_frame_is_chosen_as_it_would_be_by_the_panorama() {
     let options = CanvasOptions::default();
     let [framed, whole] = framed_and_whole(&input, &options, None, usize::MAX);
     let coverage = Coverage::of(&layout);
-    let framing = Framing { coverage: &coverage, options: &options, known: None };
+    let framing = Framing { coverage: &coverage, options: &options, known: None, check: None };
     let expected = framing.of_panorama(&whole.panorama, &layout).expect("in memory");
     assert_eq!(framed.frame.as_ref(), Some(&expected));
     let Frame::Part(kept) = expected else { panic!("{expected:?}") };
@@ -100,4 +100,36 @@ fn the_frame_is_chosen_as_it_would_be_by_the_panorama() {
     assert_eq!(kept, Rectangle { columns: 0..1440, rows: 12..400 });
     let [framed, whole] = [framed, whole].map(|one| kept_samples(one.panorama, &layout, &options, &kept));
     assert!(framed == whole);
+}
+
+/// What refuses every size, and notes it.
+#[derive(Debug, Default)]
+struct Refusal(std::cell::Cell<Option<[usize; 2]>>);
+
+impl SizeCheck for Refusal {
+    fn check(&self, size: [usize; 2]) -> Result<()> {
+        self.0.set(Some(size));
+        Err(trueup_core::Error::input("pano.webp", "it is too large", "Make it smaller."))
+    }
+}
+
+/// Of a canvas that is cropped, the size of what is kept counts.
+#[test]
+fn a_size_that_is_not_accepted_is_refused_before_it_is_composed() {
+    let (layout, corrections, photographs) = scene();
+    let input = RenderInput { layout: &layout, corrections: &corrections, photographs: &photographs };
+    for crop in [Crop::Rectangle, Crop::Auto] {
+        let options = CanvasOptions { crop, ..CanvasOptions::default() };
+        let [framed, _] = framed_and_whole(&input, &options, None, usize::MAX);
+        let kept = framed.frame.expect("a frame").part_of([layout.width, layout.height]).size();
+        let coverage = Coverage::of(&layout);
+        let refusal = Refusal::default();
+        let framing = Framing { coverage: &coverage, options: &options, known: None, check: Some(&refusal) };
+        let (look, seams, context) = (RenderOptions::default(), SeamOptions::default(), StageContext::default());
+        let disk = RamDisk::default();
+        let resources = Resources { memory: usize::MAX, ceiling: usize::MAX, scratch: &disk, helpers: None };
+        let refused = run(&input, &resources, &look, &seams, Some(&framing), &context).expect_err("too large");
+        assert!(refused.to_string().contains("too large"), "{refused}");
+        assert_eq!(refusal.0.get(), Some(kept), "{crop:?}");
+    }
 }

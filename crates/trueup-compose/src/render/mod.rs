@@ -260,6 +260,9 @@ impl Composing<'_> {
         let framing = framing.filter(|_| !has_alpha);
         let ahead = ahead.filter(|_| !has_alpha);
         frame = frame.filter(|_| !has_alpha);
+        if let Some((framing, frame)) = framing.zip(frame.as_ref()) {
+            framing.check_size(frame, layout)?;
+        }
         let seams = match views.len() {
             1 => Seams::of_one(size[0], size[1]),
             _ => {
@@ -284,7 +287,9 @@ impl Composing<'_> {
         let blending = Blending::new(input)?;
         if let Some((framing, cells)) = framing.zip(cells) {
             let changes = blending.changes(&cells.places())?;
-            frame = Some(framing.of_cells(&cells.blended(&changes, &encoding), layout));
+            let chosen = framing.of_cells(&cells.blended(&changes, &encoding), layout);
+            framing.check_size(&chosen, layout)?;
+            frame = Some(chosen);
         }
         let parts = to_finish(layout, framing, frame.as_ref());
         let pixels = match helpers {

@@ -48,7 +48,7 @@ pub use options::{
     Alpha, BigTiff, ChromaSubsampling, DeepZoomFormat, Depth, LayerExtent, MetadataKept, OutputOptions, OutputProfile,
     PngCompression, TiffCompression, TiffLayout,
 };
-pub use pending::check_place;
+pub use pending::{check_name, check_place};
 pub use place::{is_standard_output, passes_through, same_place};
 pub use stale::clear_parts;
 pub use unfinished::{abandon_unfinished, abandon_unfinished_soon};
@@ -111,6 +111,7 @@ pub fn write(
 pub fn check_writable(path: &Path, options: &OutputOptions) -> Result<()> {
     // Before its extension is missed, of which folders have none.
     pending::refuse_folder(path)?;
+    check_name(path)?;
     match writing_to(path, options)?.writer {
         Writer::Files { check_places, .. } => check_places(path),
         Writer::File(_) => check_place(path),
@@ -123,6 +124,14 @@ pub fn check_writable(path: &Path, options: &OutputOptions) -> Result<()> {
 /// [`Error::Unsupported`].
 pub fn check_format(path: &Path, options: &OutputOptions) -> Result<()> {
     writing_to(path, options).map(drop)
+}
+
+/// Checks that the format that the extension of `path` names can hold a panorama of `size` pixels (width, height).
+///
+/// # Errors
+/// [`Error::Limits`] with the sides; [`Error::Input`] for an empty picture; those of [`check_format`].
+pub fn check_size(path: &Path, [width, height]: [usize; 2], options: &OutputOptions) -> Result<()> {
+    check_sides(path, writing_to(path, options)?.sides, width, height)
 }
 
 /// Writes a file that appears complete or not at all, also where the computer loses power; for reports and project files.

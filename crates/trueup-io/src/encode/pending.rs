@@ -46,6 +46,7 @@ impl PendingFile {
     /// Makes an empty file in the folder of `path`, or for what is no regular file in that for temporary files.
     pub(crate) fn create(path: &Path) -> Result<Self> {
         refuse_folder(path)?;
+        check_name(path)?;
         if passes_through(path) {
             return Self::create_through(path);
         }
@@ -164,6 +165,19 @@ pub(crate) fn refuse_folder(path: &Path) -> Result<()> {
     }
 }
 
+/// Checks that a file may be called as `path` is, wherever it comes to lie: its temporary name is short, and its own is needed when all is done.
+///
+/// # Errors
+/// [`Error::Input`] if its name, or the path, is longer than the operating system allows.
+pub fn check_name(path: &Path) -> Result<()> {
+    match path.symlink_metadata() {
+        Err(error) if error.kind() == ErrorKind::InvalidFilename => {
+            Err(Error::input(path.display(), "its name is too long", "Give it a shorter name."))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Refuses `shown`, which is to lie in `folder`, if that folder does not exist.
 pub(super) fn require_folder(folder: &Path, shown: impl Display) -> Result<()> {
     if folder.is_dir() {
@@ -208,6 +222,17 @@ mod tests {
         let desk = tempfile::tempdir().expect("a folder");
         let file = desk.path().join("pano.jpg");
         assert_eq!(PendingFile::create(&file).expect("possible").place(), resolved(&file));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_name_that_is_too_long_is_found_before_it_is_needed() {
+        let desk = tempfile::tempdir().expect("a folder");
+        // Most file systems of Unix take 255 bytes.
+        let named = |bytes: usize| desk.path().join(format!("{}.jpg", "p".repeat(bytes - 4)));
+        check_place(&named(200)).expect("short enough");
+        let message = check_place(&named(256)).expect_err("too long").to_string();
+        assert!(message.ends_with("its name is too long. Give it a shorter name."), "{message}");
     }
 
     /// Linux refuses to sync a device of characters.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::{Result, StageContext};
+use trueup_io::encode;
 
 use super::developed::with_developed;
 use super::inputs::Inputs;
@@ -109,6 +110,10 @@ impl StitchJob {
     fn check(&self, outputs: &Outputs, options: &StitchOptions) -> Result<()> {
         outputs.check(options)?;
         let photographs = self.inputs.files();
+        if self.inputs.all {
+            // No more panoramas than photographs: the longest names that may come.
+            outputs.numbered(Some(photographs.len())).files().try_for_each(encode::check_name)?;
+        }
         let photographs = photographs.iter().map(|path| (path.as_path(), ReadFile::Photograph));
         let masks = self.inputs.masks.iter().map(|mask| (mask.file.as_path(), ReadFile::Mask));
         let graph = self.inputs.graph.iter().map(|path| (path.as_path(), ReadFile::Graph));

@@ -1,7 +1,9 @@
 //! The compose phase: light, then seams and the panorama, from the full-resolution photographs.
 
+use std::path::Path;
+
 use serde::Serialize;
-use trueup_compose::crop::{Coverage, Crop, Frame, Framing, Rectangle};
+use trueup_compose::crop::{Coverage, Crop, Frame, Framing, Rectangle, SizeCheck};
 use trueup_compose::exposure::{self, Corrections, ExposureInput, ExposureOptions, Thumbnail};
 use trueup_compose::gaps::Gaps;
 use trueup_compose::layout::{CanvasLayout, CanvasOptions};
@@ -12,6 +14,7 @@ use trueup_core::raster::Raster;
 use trueup_core::source::{PhotographSource, WorkingFrame};
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
+use trueup_io::encode::{self, OutputOptions};
 
 use crate::memo::{KeyMaker, LIGHT, Memo};
 use crate::options::ComposeOptions;
@@ -102,6 +105,21 @@ pub(crate) struct ComposeInput<'a> {
     pub canvas: &'a CanvasOptions,
     /// What becomes of the canvas, if that is decided.
     pub kept: Option<Frame>,
+    /// Where the panorama is to be written, if that is known.
+    pub destination: Option<Destination<'a>>,
+}
+
+/// A file that a panorama is to be written to. Formats limit its sides, which is found before the panorama is composed for nothing.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Destination<'a> {
+    pub path: &'a Path,
+    pub options: &'a OutputOptions,
+}
+
+impl SizeCheck for Destination<'_> {
+    fn check(&self, size: [usize; 2]) -> Result<()> {
+        encode::check_size(self.path, size, self.options)
+    }
 }
 
 /// What comes of composing.
@@ -126,8 +144,12 @@ pub(crate) fn run(
     options: &ComposeOptions,
     context: &StageContext,
 ) -> Result<Reported<Composed>> {
-    let ComposeInput { render: photographs, resources, canvas, kept } = input;
+    let ComposeInput { render: photographs, resources, canvas, kept, destination } = input;
     let layout = photographs.layout;
+    let check = destination.as_ref().map(|destination| destination as &dyn SizeCheck);
+    if let Some(check) = check.filter(|_| canvas.crop == Crop::None) {
+        check.check([layout.width, layout.height])?;
+    }
     context.gather(|context| {
         let render = |framing: Option<&Framing>| {
             context.time("render", || {
@@ -139,7 +161,7 @@ pub(crate) fn run(
             return Ok(Composed { rendered: render(None)?, kept: None, lost: 0.0, filled: 0.0 });
         }
         let photographed = context.time("crop", || Coverage::of(layout));
-        let framing = Framing { coverage: &photographed, options: canvas, known: kept.as_ref() };
+        let framing = Framing { coverage: &photographed, options: canvas, known: kept.as_ref(), check };
         // What is filled counts as covered: where all gaps are, the frame is chosen last.
         let mut rendered = render((!fills).then_some(&framing))?;
         context.time("crop", || {

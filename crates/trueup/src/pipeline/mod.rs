@@ -50,7 +50,7 @@ use self::align::{AlignInput, Geometry};
 use self::arrange::{ArrangeInput, Arrangement};
 use self::borders::{BordersInput, Unbordered};
 use self::budget::Budget;
-use self::compose::{ComposeInput, Composed, LightInput, SmallPhotograph};
+use self::compose::{ComposeInput, Composed, Destination, LightInput, SmallPhotograph};
 use self::matched::Matched;
 use self::matching::MatchInput;
 use self::measure::MeasureInput;
@@ -423,6 +423,7 @@ impl<'a> Stitcher<'a> {
             },
             canvas: &canvas,
             kept: alignment.kept.clone(),
+            destination: self.output.map(|path| Destination { path, options: &self.options.compose.output }),
         };
         let composed =
             self.context.gather(|context| Ok(context.absorb(compose::run(&input, &self.options.compose, context)?)))?;
