@@ -131,3 +131,12 @@ fn a_flat_scene_can_be_forbidden_and_asked_for() {
     let warp = finish(trueup(desk.path(), &["stitch", "wall", "-o", "c.png", "--scene", "plane", "--method", "apap"]));
     warp.expect_failure(1, &["cameras.scene = plane", "the method apap"]);
 }
+
+/// There is no Hugin project of a flat scene: that is found before the panorama is made.
+#[test]
+fn what_cannot_be_recorded_of_a_flat_scene_is_refused_before_anything_is_written() {
+    let (desk, _) = photographed(FlatSetKind::Mural);
+    let run = finish(trueup(desk.path(), &["stitch", "wall", "-o", "pano.jpg", "--pto", "pano.pto", "--scale", "0.5"]));
+    run.expect_failure(1, &["trueup: error: pano.pto: Hugin project: the photographs show a flat scene"]);
+    assert_eq!(desk.files(), ["wall"]);
+}

@@ -20,8 +20,14 @@ pub(super) enum SideOutputWriter {
     Panorama(fn(&Stitcher, &Alignment, &Rendered, &Path) -> Result<()>),
     /// The aligned photographs, when the panorama is written.
     Photographs(fn(&Stitcher, &Alignment, &Path) -> Result<()>),
-    /// The record, when all else is written: its text.
-    Record(fn(&Project) -> Result<String>),
+    /// The record, when all else is written: its text. Of what is `known` when all photographs have their places, it is refused before
+    /// anything is written where there can be none.
+    Record {
+        /// The refusal.
+        check: fn(known: &Project) -> Result<()>,
+        /// The text.
+        text: fn(&Project) -> Result<String>,
+    },
 }
 
 macro_rules! side_outputs {
@@ -68,11 +74,11 @@ side_outputs! {
     /// Write the panorama's record (geometry, pairs, reasons, timings) as JSON
     Project("project", "FILE.json")
         checked by |path, _| encode::check_place(path),
-        written by SideOutputWriter::Record(Project::to_json);
+        written by SideOutputWriter::Record { check: |_| Ok(()), text: Project::to_json };
     /// Write the cameras as a project of the Hugin stitcher
     HuginProject("pto", "FILE.pto")
         checked by |path, _| encode::check_place(path),
-        written by SideOutputWriter::Record(hugin_project);
+        written by SideOutputWriter::Record { check: |known| hugin_project(known).map(drop), text: hugin_project };
     /// Write the photographs as layers, aligned and corrected, one to a page (output.layer_extent)
     Layers("layers", "FILE.tif")
         checked by |path, _| encode::check_layers_place(path),

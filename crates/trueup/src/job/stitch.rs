@@ -87,6 +87,10 @@ impl StitchJob {
         for outputs in outputs.iter().filter(|_| count > 1) {
             self.check(outputs, options)?;
         }
+        // What one of several panoramas cannot have is refused before any is made.
+        for (alignment, outputs) in aligned.alignments.iter().zip(&outputs) {
+            outputs.check_records(&alignment.project)?;
+        }
         let stale = if self.inputs.all { self.outputs.stale(count) } else { Vec::new() };
         if let Some(first) = aligned.alignments.first_mut() {
             first.project.diagnostics.extend(told);

@@ -4,7 +4,7 @@ use std::borrow::Borrow;
 use std::path::{Path, PathBuf};
 
 use trueup_compose::render::Rendered;
-use trueup_core::Result;
+use trueup_core::{Error, Result};
 use trueup_io::{encode, source};
 
 use super::outputs::{Outputs, ReadFile};
@@ -39,6 +39,7 @@ impl Outputs {
     /// Those of [`Self::write`].
     pub(super) fn write_pictures(&self, stitcher: &Stitcher, mut alignment: Alignment) -> Result<Written> {
         self.refuse_read(&alignment)?;
+        self.check_records(&alignment.project)?;
         let rendered = stitcher.writing_to(&self.panorama).compose(&mut alignment)?;
         self.write_pictures_of(stitcher, alignment, rendered)
     }
@@ -55,6 +56,7 @@ impl Outputs {
         rendered: impl Borrow<Rendered>,
     ) -> Result<Written> {
         self.refuse_read(&alignment)?;
+        self.check_records(&alignment.project)?;
         let written = self.write_pictures_of(stitcher, alignment, rendered)?;
         written.write_records().map(|()| written)
     }
@@ -88,6 +90,23 @@ impl Outputs {
         let (bytes, told) = written.split();
         alignment.record(told);
         Ok(Written { outputs: self.clone(), bytes, project: alignment.project })
+    }
+
+    /// Refuses records that there cannot be of an aligned panorama, before it is composed.
+    ///
+    /// # Errors
+    /// [`trueup_core::Error::Input`] that names the file.
+    pub(super) fn check_records(&self, project: &Project) -> Result<()> {
+        let of_file = |path: &Path, error| match error {
+            Error::Input { subject, reason, hint } => {
+                Error::input(format!("{}: {subject}", path.display()), reason, hint)
+            }
+            other => other,
+        };
+        self.beside.iter().try_for_each(|(kind, path)| match kind.writer() {
+            SideOutputWriter::Record { check, .. } => check(project).map_err(|error| of_file(path, error)),
+            SideOutputWriter::Panorama(_) | SideOutputWriter::Photographs(_) => Ok(()),
+        })
     }
 
     fn refuse_read(&self, alignment: &Alignment) -> Result<()> {
@@ -128,7 +147,7 @@ impl Written {
     /// Those of writing.
     pub(super) fn write_records(&self) -> Result<()> {
         for (kind, path) in &self.outputs.beside {
-            if let SideOutputWriter::Record(text) = kind.writer() {
+            if let SideOutputWriter::Record { text, .. } = kind.writer() {
                 encode::write_atomically(path, text(&self.project)?.as_bytes())?;
             }
         }

@@ -112,6 +112,20 @@ impl Matched {
         Ok(Component::new(members, reference, rotation, &self.set.images, &self.measured, &self.pairs))
     }
 
+    /// An error of the group `members`, which names it where it is one of several `groups` and a choice that was made suits the others.
+    pub(crate) fn of_group(&self, error: Error, members: &[usize], groups: &[Vec<usize>]) -> Error {
+        let number = groups.iter().position(|group| group == members).filter(|_| groups.len() > 1);
+        match (error, number, members) {
+            (Error::NotApplicable { method, reason, hint }, Some(number), [first, others @ ..]) => {
+                let first = &self.set.images[*first].name;
+                let which =
+                    format!("panorama {} of {}, of {first} and {} more", number + 1, groups.len(), others.len());
+                Error::not_applicable(method, format!("{which}: {reason}"), hint)
+            }
+            (error, ..) => error,
+        }
+    }
+
     /// What decides the measurements of the group `members`; `None` where that is not known.
     pub(crate) fn key_of(&self, members: &[usize]) -> Option<KeyMaker> {
         members.iter().try_fold(KeyMaker::new(), |maker, &member| Some(maker.key(self.keys[member].as_ref()?)))

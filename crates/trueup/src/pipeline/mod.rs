@@ -241,7 +241,9 @@ impl<'a> Stitcher<'a> {
         let (groups, told) = shared.split();
         let align = |group: &Vec<usize>| {
             let found = self.context.gather(|context| {
-                let alignment = self.align_group(group, &groups, set, inputs, directions, context)?;
+                let alignment = self
+                    .align_group(group, &groups, set, inputs, directions, context)
+                    .map_err(|error| set.matched.of_group(error, group, &groups))?;
                 self.report_cache(context);
                 Ok(alignment)
             })?;
