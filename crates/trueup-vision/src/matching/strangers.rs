@@ -100,6 +100,8 @@ pub struct StrangersInput<'a> {
     pub by_camera: &'a [bool],
     /// When each was taken, as far as its file says. What was taken at two moments is no copy.
     pub taken: &'a [Option<String>],
+    /// Whether the photographer marked parts of it (masks): such a photograph is meant to stand for itself, beside what it is a copy of.
+    pub marked: &'a [bool],
     /// Whether edited copies are looked for: not where several exposures of a view are to be stitched as they are.
     pub copies: bool,
 }
@@ -255,8 +257,9 @@ fn edited_copies(
     let by_camera = |photograph: usize| input.by_camera.get(photograph).copied().unwrap_or(false);
     let mut of: BTreeMap<usize, usize> = BTreeMap::new();
     let is_reduced = |photograph| reduced.contains_key(&photograph);
+    let is_marked = |photograph: usize| input.marked.get(photograph).copied().unwrap_or(false);
     for view in views.iter().filter(|view| view.is_same() && view.is_one_exposure) {
-        if is_reduced(view.a) || is_reduced(view.b) {
+        if [view.a, view.b].into_iter().any(|one| is_reduced(one) || is_marked(one)) {
             continue;
         }
         // `a` has the smaller number.

@@ -4,7 +4,7 @@ use super::*;
 
 /// Files of which nothing is known.
 fn found(frames: &[WorkingFrame], pairs: &[PairMatches]) -> Vec<Stranger> {
-    find_strangers(&StrangersInput { frames, pairs, by_camera: &[], taken: &[], copies: true })
+    find_strangers(&StrangersInput { frames, pairs, by_camera: &[], taken: &[], marked: &[], copies: true })
 }
 
 /// Joined by what moves a point of `a` by (`right`, `down`) into `b` and makes it `scale` times as large.
@@ -195,11 +195,21 @@ fn same_place(a: usize, b: usize, off: f64) -> PairMatches {
 
 /// A row of three photographs, and as number 3 a picture of the second one's view.
 fn row_with_copy(off: f64, by_camera: &[bool], taken: &[Option<String>], copies: bool) -> Vec<Stranger> {
+    marked_row_with_copy(off, by_camera, taken, &[], copies)
+}
+
+fn marked_row_with_copy(
+    off: f64,
+    by_camera: &[bool],
+    taken: &[Option<String>],
+    marked: &[bool],
+    copies: bool,
+) -> Vec<Stranger> {
     let mut frames = frames(&[[600.0, 400.0]; 4]);
     frames[3] = WorkingFrame { working_from_full: 0.5 / 1.03, ..frames[1] };
     let mut pairs = vec![pair(0, 1, 1.0, -150.0, 0.0), pair(1, 2, 1.0, -150.0, 0.0), same_place(1, 3, off)];
     pairs.push(pair(0, 3, 1.0, -150.0, 0.0));
-    find_strangers(&StrangersInput { frames: &frames, pairs: &pairs, by_camera, taken, copies })
+    find_strangers(&StrangersInput { frames: &frames, pairs: &pairs, by_camera, taken, marked, copies })
 }
 
 #[test]
@@ -212,6 +222,17 @@ fn of_copies_the_one_with_metadata_is_kept_or_the_larger() {
     assert_eq!(row_with_copy(0.1, &[], &[], false), []);
     let taken = ["1", "2", "3", "4"].map(|second| Some(format!("2024:05:04 10:00:0{second}")));
     assert_eq!(row_with_copy(0.1, &[], &taken, true), []);
+}
+
+/// An exposure of a bracket with a mask stands for itself, and so does what the others are fused to.
+#[test]
+fn what_a_photographer_marked_is_no_copy() {
+    for marked in [1, 3] {
+        let marked: Vec<bool> = (0..4).map(|photograph| photograph == marked).collect();
+        assert_eq!(marked_row_with_copy(0.1, &[], &[], &marked, true), []);
+    }
+    let of_another = [true, false, false, false];
+    assert_eq!(marked_row_with_copy(0.1, &[], &[], &of_another, true).len(), 1);
 }
 
 #[test]

@@ -289,6 +289,14 @@ impl Matched {
             self.set.files.forget(index);
             let LeftOut { code, reason, hint } = self.why_left_out(index, stitched);
             context.report(Diagnostic::warning(code, Subject::Photograph(index), reason, hint));
+            if !self.set.masks[index].is_empty() {
+                context.report(Diagnostic::warning(
+                    "mask-not-heeded",
+                    Subject::Photograph(index),
+                    "there is a mask of it, but the photograph itself is left out",
+                    "Look at why it is left out, or give the mask of the photograph that is used.",
+                ));
+            }
         }
         for rejected in &self.set.rejected {
             let subject = Subject::file(&rejected.name);

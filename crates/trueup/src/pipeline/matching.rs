@@ -29,6 +29,8 @@ pub(crate) struct MatchInput<'a> {
     pub wished: &'a [(usize, usize)],
     /// The photographs' files: which a camera took, and when.
     pub images: &'a [SourceImage],
+    /// Whether there are masks of each.
+    pub marked: &'a [bool],
     /// Whether copies of photographs are looked for: not where each exposure of a view is to stand for itself.
     pub copies: bool,
     /// What decides the features of each.
@@ -70,8 +72,8 @@ pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageCon
 fn strangers(input: &MatchInput, pairs: &[PairMatches]) -> Vec<Stranger> {
     let by_camera: Vec<bool> = input.images.iter().map(SourceImage::is_by_camera).collect();
     let taken: Vec<Option<String>> = input.images.iter().map(|image| image.exposure.taken.clone()).collect();
-    let (frames, copies) = (input.frames, input.copies);
-    matching::find_strangers(&StrangersInput { frames, pairs, by_camera: &by_camera, taken: &taken, copies })
+    let MatchInput { frames, marked, copies, .. } = *input;
+    matching::find_strangers(&StrangersInput { frames, pairs, by_camera: &by_camera, taken: &taken, marked, copies })
 }
 
 /// Every pair tried: those wished for in their order, or those proposed, ascending.

@@ -180,6 +180,7 @@ impl<'a> Stitcher<'a> {
                 usable: &looked_at.usable,
                 wished: &matched.graph_file.edges,
                 images: &matched.set.images,
+                marked: &matched.set.marked(),
                 copies: self.options.measure.stacks.fuse != Fuse::None,
                 keys: &matched.keys,
                 memo,

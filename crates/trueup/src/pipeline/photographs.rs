@@ -119,6 +119,11 @@ impl PhotographSet {
         self.images.iter().map(|image| image.name.clone()).collect()
     }
 
+    /// Whether there are masks of each photograph.
+    pub(crate) fn marked(&self) -> Vec<bool> {
+        self.masks.iter().map(|masks| !masks.is_empty()).collect()
+    }
+
     /// What decides the pixels of these photographs: their bytes, how they are turned and masked, the color space and the light that they are brought
     /// to, and of a stack the same of each exposure. `None` for files that cannot be read.
     ///
