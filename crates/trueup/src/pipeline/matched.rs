@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use trueup_align::stitch_graph::{GraphFile, StitchGraph};
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::matches::PairMatches;
-use trueup_core::source::WorkingFrame;
+use trueup_core::source::{PhotographSource, WorkingFrame};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::RejectedSource;
 use trueup_vision::features::{self, FeatureSource, Features};
@@ -236,23 +236,55 @@ impl Matched {
     }
 
     fn no_overlap(&self) -> Error {
+        const HINT: &str =
+            "Photographs must share a third of their view, with detail in it; join pairs by hand in a --graph file.";
+        const OF_MASKS: &str =
+            "White is used of a mask, black is ignored: swap them if the mask is the wrong way round.";
         let names = self.set.names();
-        let best = self.pairs.iter().max_by(|one, two| strength(one).total_cmp(&strength(two)));
-        let why = match best.filter(|pair| pair.putative > 0) {
-            Some(pair) => format!(
-                "no overlapping photographs found; the best pair is {} and {}: {}",
-                names[pair.a],
-                names[pair.b],
-                counts(pair)
-            ),
-            None => "no overlapping photographs found".to_owned(),
+        let none_found = |why: &str, hint: &str| {
+            let why = if why.is_empty() { String::new() } else { format!("; {why}") };
+            let why = format!("no overlapping photographs found{why}");
+            Error::unsolvable("matching", format!("{} photographs", names.len()), why, hint)
         };
-        Error::unsolvable(
-            "matching",
-            format!("{} photographs", names.len()),
-            why,
-            "Photographs must share a third of their view, with detail in it; join pairs by hand in a --graph file.",
-        )
+        let nothing_seen: Vec<usize> = (0..names.len()).filter(|&index| self.shows_nothing(index)).collect();
+        if !nothing_seen.is_empty() {
+            let is_masked = |index: usize| self.set.files.masks(index).ignored.is_some();
+            let words = |&index: &usize| match is_masked(index) {
+                true => format!("the mask of {} ignores all of it that is not black", names[index]),
+                false => format!("all of {} is black or transparent", names[index]),
+            };
+            let words: Vec<String> = nothing_seen.iter().map(words).collect();
+            return none_found(
+                &several(&words),
+                if nothing_seen.iter().any(|&index| is_masked(index)) { OF_MASKS } else { HINT },
+            );
+        }
+        if !self.strangers.is_empty() {
+            let words = |stranger: &Stranger| {
+                format!("{}: {}", names[stranger.photograph], no_photograph(stranger, &names).reason)
+            };
+            let words: Vec<String> = self.strangers.iter().map(words).collect();
+            return none_found(
+                &several(&words),
+                "Give photographs of neighboring views; copies of one make no panorama.",
+            );
+        }
+        let best = self.pairs.iter().max_by(|one, two| strength(one).total_cmp(&strength(two)));
+        match best.filter(|pair| pair.putative > 0) {
+            Some(pair) => {
+                let best = format!("the best pair is {} and {}: {}", names[pair.a], names[pair.b], counts(pair));
+                none_found(&best, HINT)
+            }
+            None => none_found("", HINT),
+        }
+    }
+
+    /// Whether nothing is seen in a photograph: black, transparent and masked parts are black in the small copy.
+    fn shows_nothing(&self, index: usize) -> bool {
+        /// Levels up to which compression leaves black.
+        const BLACK: u8 = 3;
+        let small = self.measured[index].as_ref().map(|measured| measured.thumbnail.data());
+        small.is_some_and(|levels| levels.iter().all(|&level| level <= BLACK))
     }
 
     /// Refuses to leave anything out of the groups `stitched`.
