@@ -24,7 +24,7 @@ const NO_UTF8: &str = "its name is no UTF-8";
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PhotographsOfFolder {
     /// The folder below the one that was looked into, with `/` between folders, and `+2`, `+3` ... behind it for what was taken
-    /// later in the same folder; `.` for the folder itself. No two sets have one name.
+    /// later in the same folder; `.` for the folder itself, `+2` for what was taken later there. No two sets have one name.
     pub name: String,
     /// The photographs, in the natural order of their names.
     pub photographs: Vec<PathBuf>,
@@ -222,7 +222,9 @@ fn named(parts: Vec<Part>) -> Vec<PhotographsOfFolder> {
         let name = if begun.insert(folder.clone()) {
             folder
         } else {
-            let mut numbered = (2..).map(|number| format!("{folder}+{number}"));
+            // The folder itself has no name, and one that began with a point would be hidden.
+            let stem = if folder == ROOT { "" } else { &folder };
+            let mut numbered = (2..).map(|number| format!("{stem}+{number}"));
             numbered.find(|name| taken.insert(name.clone())).unwrap_or(folder)
         };
         sets.push(PhotographsOfFolder { name, photographs });
@@ -249,7 +251,8 @@ mod tests {
             let sets = named(folders.iter().map(|folder| part(folder)).collect());
             sets.into_iter().map(|set| set.name).collect::<Vec<_>>()
         };
-        assert_eq!(names(&[".", ".", "a", "a", "a"]), [".", ".+2", "a", "a+2", "a+3"]);
+        assert_eq!(names(&[".", ".", "a", "a", "a"]), [".", "+2", "a", "a+2", "a+3"]);
+        assert_eq!(names(&[".", ".", "+2"]), [".", "+3", "+2"]);
         assert_eq!(names(&["a", "a", "a+2", "a+2"]), ["a", "a+3", "a+2", "a+2+2"]);
     }
 

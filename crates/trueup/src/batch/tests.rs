@@ -317,3 +317,17 @@ fn a_file_where_the_folder_for_the_panoramas_is_to_be_is_refused() {
     let refused = run(job(&desk), &options()).expect_err("it is no folder").to_string();
     assert!(refused.contains("it is no folder, but a file") && refused.contains("another folder"), "{refused}");
 }
+
+#[test]
+fn a_pair_with_a_damaged_photograph_makes_no_panorama() {
+    let desk = tree(&["a"]);
+    fs::remove_file(desk.path().join("in/a/02.jpg")).expect("removed");
+    let whole = fs::read(desk.path().join("in/a/01.jpg")).expect("a photograph");
+    fs::write(desk.path().join("in/a/01.jpg"), &whole[..whole.len() / 2]).expect("cut");
+    assert_eq!(run(job(&desk), &options()).expect("done"), ["a"]);
+    let out = desk.path().join("out/a");
+    let record = SetRecord::read(&out).expect("a record");
+    let SetOutcome::Failed { error, .. } = &record.outcome else { panic!("{record:?}") };
+    assert!(error.contains("00.jpg: it is the only photograph") && error.contains("01.jpg: "), "{error}");
+    assert!(names::panoramas_in(&out).is_empty());
+}

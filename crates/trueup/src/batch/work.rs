@@ -9,7 +9,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use serde_json::{Value, json};
 use trueup_core::diagnostics::{Diagnostic, Subject};
@@ -115,7 +115,7 @@ impl<'a> Work<'a> {
                 done => return done,
             },
         };
-        let record = self.record(position, self.made_of(set, |_| true), outcome);
+        let record = self.record(position, self.made_of(set, |_| true), &self.panoramas_of(position), outcome);
         self.batch.unkept.lock().unwrap_or_else(PoisonError::into_inner).insert(position, record.clone());
         Ok(Attempt::Done(record))
     }
@@ -157,25 +157,41 @@ impl<'a> Work<'a> {
         }
         // As the photographs are before they are read: what changes under way is to be seen next time.
         let made_of = self.made_of(set, |_| true);
+        let earlier = self.panoramas_of(position);
         let done = self.outcome(set, &folder, &claim, context).and_then(|outcome| {
-            let record = self.record(position, made_of, outcome);
+            let record = self.record(position, made_of, &earlier, outcome);
             record.write(&folder).map(|()| record)
         });
         claim.release();
         done.map(Attempt::Done)
     }
 
-    /// What is to be kept of a set now.
-    fn record(&self, position: usize, made_of: Value, outcome: SetOutcome) -> SetRecord {
+    /// The panoramas that lie in a set's folder, with when they were written.
+    fn panoramas_of(&self, position: usize) -> BTreeMap<PathBuf, Option<SystemTime>> {
+        let panoramas = names::panoramas_in(&self.folder_of(position)).into_iter();
+        panoramas.map(|path| (path.clone(), written_at(&path))).collect()
+    }
+
+    /// What is to be kept of a set now. Of `earlier` panoramas, which were there before, those that are neither gone nor written anew are
+    /// outdated; what this attempt has written before it failed is no earlier one's.
+    fn record(
+        &self,
+        position: usize,
+        made_of: Value,
+        earlier: &BTreeMap<PathBuf, Option<SystemTime>>,
+        outcome: SetOutcome,
+    ) -> SetRecord {
         let (set, output) = (&self.batch.sets[position], &self.batch.job.output);
         let shown = |path: PathBuf| path.strip_prefix(output).unwrap_or(&path).display().to_string();
+        let left = names::panoramas_in(&self.folder_of(position)).into_iter();
+        let left = left.filter(|path| earlier.get(path) == Some(&written_at(path)));
         let mut record = SetRecord {
             set: set.name.clone(),
             photographs: set.photographs.len(),
             made_of,
             ended_ms: now_ms(),
             outcome,
-            outdated: names::panoramas_in(&self.folder_of(position)).into_iter().map(shown).collect(),
+            outdated: left.map(shown).collect(),
         };
         let current: Vec<String> =
             record.panoramas().iter().filter_map(|one| one["panorama"].as_str().map(str::to_owned)).collect();
@@ -263,12 +279,17 @@ impl<'a> Work<'a> {
             .with(SideOutput::Project, folder.join(names::project()))
             .with(SideOutput::Thumbnail, folder.join(names::thumbnail()));
         let photographs = set.photographs.iter().map(|path| path.display().to_string());
-        let inputs = Inputs { all: true, ..Inputs::new(photographs) };
+        let inputs = Inputs { all: true, refuse_single: true, ..Inputs::new(photographs) };
         // Findings are a set's own, and so is progress where there is one at a time.
         let own = if self.at_once > 1 { context.without_progress() } else { context.seeded(context.seed()) };
         let written = StitchJob { inputs, outputs, cache: None, threads: self.threads }.run(&self.options, &own)?;
         Ok(written.iter().map(|one| below(one.summary(), &job.output)).collect())
     }
+}
+
+/// When a file was written last, as far as the file system says.
+fn written_at(path: &Path) -> Option<SystemTime> {
+    path.metadata().and_then(|metadata| metadata.modified()).ok()
 }
 
 /// Makes the folder for the panoramas, if it is not there.
@@ -358,4 +379,30 @@ fn without_locks(output: &Path) -> Diagnostic {
         "files in it cannot be locked: programs that work there at the same time make the same panoramas twice",
         "Give each a part of its own (--shard).",
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::batch::BatchJob;
+
+    /// As on a full disk, which takes the panorama and nothing more.
+    #[test]
+    fn what_a_failed_attempt_has_written_is_of_no_earlier_one() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room");
+        let (photographs, output) = (desk.path().join("in"), desk.path().join("out"));
+        std::fs::create_dir_all(&photographs).expect("a folder");
+        for name in ["00.jpg", "01.jpg"] {
+            std::fs::copy(room.join(name), photographs.join(name)).expect("copied");
+        }
+        let batch = Batch::find(BatchJob::new(&photographs, &output), &StageContext::default()).expect("a set");
+        let work = Work::new(&batch, &StitchOptions::default()).expect("work");
+        let failed = || SetOutcome::failed(&Error::input("thumbnail.jpg", "there is no room", ""));
+        let earlier = work.panoramas_of(0);
+        std::fs::write(output.join("panorama.jpg"), "new").expect("written");
+        assert!(work.record(0, Value::Null, &earlier, failed()).outdated.is_empty());
+        let earlier = work.panoramas_of(0);
+        assert_eq!(work.record(0, Value::Null, &earlier, failed()).outdated, ["panorama.jpg"]);
+    }
 }

@@ -38,6 +38,8 @@ pub struct Inputs {
     pub masks: Vec<MaskFile>,
     /// Fail unless every photograph given is used.
     pub require_all: bool,
+    /// Fail where only one photograph can be used, which is written as it is otherwise.
+    pub refuse_single: bool,
     /// Files that the photographs name and that are passed over, since others among the photographs stand for them: camera raw that was
     /// developed.
     pub stood_for: BTreeSet<PathBuf>,

@@ -199,6 +199,7 @@ impl Matched {
         let decodable: Vec<usize> = (0..self.measured.len()).filter(|&index| self.measured[index].is_some()).collect();
         match decodable.as_slice() {
             [] => return Err(self.none_usable()),
+            [only] if inputs.refuse_single => return Err(self.only_one(*only)),
             [only] => {
                 context.report(Diagnostic::warning(
                     "single-photograph",
@@ -233,6 +234,21 @@ impl Matched {
             joined.truncate(1);
         }
         Ok(joined)
+    }
+
+    /// The error where nothing but the photograph `only` can be used.
+    fn only_one(&self, only: usize) -> Error {
+        let undecodable = (0..self.set.images.len()).filter(|&index| index != only).map(|index| {
+            let LeftOut { reason, .. } = self.why_left_out(index, &[]);
+            format!("{}: {reason}", self.set.images[index].name)
+        });
+        let rejected = self.set.rejected.iter().map(|one| format!("{}: {}", one.name, one.reason));
+        let reasons: Vec<String> = undecodable.chain(rejected).collect();
+        Error::input(
+            &self.set.images[only].name,
+            format!("it is the only photograph that can be used, which makes no panorama: {}", several(&reasons)),
+            "Mend the others, or take the set away.",
+        )
     }
 
     fn no_overlap(&self) -> Error {
