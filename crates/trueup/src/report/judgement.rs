@@ -4,10 +4,10 @@ use std::fmt;
 
 use serde::Serialize;
 use trueup_align::metrics::BENT_SHARE;
-use trueup_align::projection::FlatKind;
+use trueup_align::projection::{FlatKind, ProjectionOptions};
 use trueup_core::diagnostics::{Diagnostic, Subject};
 
-use super::measures::{Measures, lean_side};
+use super::measures::{Measures, PhotographMeasures, lean_side};
 use crate::options::Evidence;
 use crate::pipeline::align::PARALLAX;
 use crate::project::record::Project;
@@ -61,12 +61,13 @@ const BENT: [f64; 2] = [BENT_SHARE, 0.02];
 /// A plain word for every figure that was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Judgement {
-    /// How upright it is: by the widest lean that is probable.
+    /// How upright it is: by the widest lean that is probable, beyond that by which the viewer's head was asked to be turned. `None` where the
+    /// viewer was asked to look up or down, from where upright things lean wherever cameras are right.
     pub upright: Option<Verdict>,
     /// How well photographs meet: by the distances of matched points.
     pub alignment: Option<Verdict>,
     /// How straight lines are: by the longest that is bent. `None` for a full turn, which bows level lines wherever cameras are right; a viewer
-    /// that looks round in it shows them straight.
+    /// that looks round in it shows them straight; and for a view asked to look up or down that is not flat, which bows them as well.
     pub lines: Option<Verdict>,
 }
 
@@ -74,18 +75,42 @@ impl Project {
     /// What the measures that were recorded mean; `None` for figures that were not measured, or say nothing of this panorama.
     pub fn judgement(&self) -> Judgement {
         let Some(measures) = &self.measures else { return Judgement::default() };
-        let upright = measures.upright.as_ref().map(|upright| upright.within_deg.unwrap_or(upright.max_deg));
+        let upright = self.upright_deg(measures);
         let apart = measures.reprojection.as_ref().map(|found| found.percentile_95_px);
         Judgement {
             upright: upright.map(|degrees| Verdict::of(degrees, LEAN_DEG)),
             alignment: apart.map(|apart| Verdict::of(apart, self.limits_apart_px())),
-            lines: measures.long_lines.as_ref().filter(|_| !self.canvas.full_turn).map(|lines| {
-                match &lines.longest_bent {
-                    None => Verdict::Good,
-                    Some(line) => Verdict::of(line.off_px / line.length_px, BENT),
-                }
+            lines: measures.long_lines.as_ref().filter(|_| !self.bows_lines()).map(|lines| match &lines.longest_bent {
+                None => Verdict::Good,
+                Some(line) => Verdict::of(line.off_px / line.length_px, BENT),
             }),
         }
+    }
+
+    /// The widest lean that is probable, degrees, that nobody asked for; `None` where it was not measured or says nothing.
+    fn upright_deg(&self, measures: &Measures) -> Option<f64> {
+        let upright = measures.upright.as_ref()?;
+        let asked = self.asked_view();
+        if asked.is_some_and(|asked| asked.pitch != 0.0) {
+            return None;
+        }
+        let asked_roll = asked.map_or(0.0, |asked| asked.roll);
+        if asked_roll == 0.0 {
+            return Some(upright.within_deg.unwrap_or(upright.max_deg));
+        }
+        let certain = measures.photographs.iter().filter(|one| one.certain);
+        certain.filter_map(|one| widest_lean_deg(one, asked_roll)).max_by(f64::total_cmp)
+    }
+
+    /// Whether the view bows straight lines as it should.
+    fn bows_lines(&self) -> bool {
+        let is_flat = self.projection.is_some_and(|projection| projection.kind == FlatKind::Perspective);
+        self.canvas.full_turn || self.asked_view().is_some_and(|asked| asked.pitch != 0.0 && !is_flat)
+    }
+
+    /// How the viewer was asked to be turned, if there is a view to turn.
+    fn asked_view(&self) -> Option<&ProjectionOptions> {
+        self.projection.map(|_| &self.options.arrange.projection)
     }
 
     /// How far apart 95 of 100 matched points may land for the alignment to be good, and to be fair, in the photographs' own
@@ -94,6 +119,14 @@ impl Project {
         let side = self.used_images().map(|image| image.width.max(image.height)).max().unwrap_or(0) as f64;
         [0, 1].map(|limit| (APART[limit] * side).max(LEAST_APART_PX[limit]))
     }
+}
+
+/// The widest lean of a photograph that is probable beyond what the viewer's head turned clockwise by `asked_roll` makes of upright things,
+/// degrees: all round, they lean the other way by up to as much. None at all is no fault either, as where the turn was asked for to mend one.
+fn widest_lean_deg(photograph: &PhotographMeasures, asked_roll: f64) -> Option<f64> {
+    let lean = photograph.lean_deg?;
+    let asked_for = lean.clamp((-asked_roll).min(0.0), (-asked_roll).max(0.0));
+    Some((lean - asked_for).abs() + photograph.within_deg.unwrap_or(0.0))
 }
 
 /// Whether lines and pixels aligned the overlaps, as asked or, as was `told`, because of parallax: nothing more can be asked for.
@@ -118,7 +151,7 @@ pub(crate) fn warnings(project: &Project, told: &[Diagnostic]) -> Vec<Diagnostic
     let judgement = project.judgement();
     let place = |path: &str| project.images.iter().position(|image| image.path == path);
     [
-        leaning(measures, &place).filter(|_| is_bad(judgement.upright)),
+        leaning(project, measures, &place).filter(|_| is_bad(judgement.upright)),
         misaligned(project, told, measures, &place).filter(|_| is_bad(judgement.alignment)),
         bent(project, measures, &place).filter(|_| is_bad(judgement.lines)),
     ]
@@ -127,13 +160,12 @@ pub(crate) fn warnings(project: &Project, told: &[Diagnostic]) -> Vec<Diagnostic
     .collect()
 }
 
-fn leaning(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Option<Diagnostic> {
+fn leaning(project: &Project, measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Option<Diagnostic> {
+    let asked_roll = project.asked_view().map_or(0.0, |asked| asked.roll);
     let certain = measures.photographs.iter().filter(|photograph| photograph.certain);
-    let widest = certain.filter_map(|one| {
-        let lean = one.lean_deg?;
-        Some((one, lean, lean.abs() + one.within_deg.unwrap_or(0.0)))
-    });
-    let (photograph, lean, within) = widest.max_by(|one, two| one.2.total_cmp(&two.2))?;
+    let widest = certain.filter_map(|one| Some((one, one.lean_deg?, widest_lean_deg(one, asked_roll)?)));
+    let (photograph, lean, _) = widest.max_by(|one, two| one.2.total_cmp(&two.2))?;
+    let within = lean.abs() + photograph.within_deg.unwrap_or(0.0);
     /// Decimals of degrees that are told.
     const DECIMALS: usize = 1;
     let side = lean_side(lean, DECIMALS);
@@ -286,6 +318,37 @@ mod tests {
         project.canvas.full_turn = true;
         assert!(warnings(&project, &[]).is_empty());
         assert_eq!(project.judgement().lines, None);
+    }
+
+    /// Of a head turned clockwise, upright things lean to the left; from above, they lean to all sides and lines are bowed.
+    #[test]
+    fn a_view_that_was_asked_for_is_no_fault() {
+        let mut project = project(3.5, 1.0, 31.8);
+        let codes = |project: &Project| -> Vec<String> {
+            warnings(project, &[]).into_iter().map(|warning| warning.code).collect()
+        };
+        let view = |kind: &str| {
+            serde_json::json!({"kind": kind, "yaw_deg": 0.0, "pitch_deg": 0.0, "roll_deg": 0.0, "panini_distance": 1.0,
+                "px_per_radian": 900.0, "origin": [0.0, 0.0], "sphere": null})
+        };
+        let set = |project: &mut Project, kind: &str, pitch: f64, roll: f64| {
+            project.projection = Some(serde_json::from_value(view(kind)).expect("a view"));
+            project.options.arrange.projection.pitch = pitch;
+            project.options.arrange.projection.roll = roll;
+        };
+        set(&mut project, "stereographic", 0.0, 0.0);
+        assert_eq!(codes(&project), ["leaning", "line-bent"]);
+        for roll in [3.0, 30.0] {
+            set(&mut project, "stereographic", 0.0, roll);
+            assert_eq!(codes(&project), ["line-bent"], "{roll}");
+        }
+        // Turned the other way, it leans all the same.
+        set(&mut project, "stereographic", 0.0, -3.0);
+        assert_eq!(codes(&project), ["leaning", "line-bent"]);
+        set(&mut project, "stereographic", -90.0, 0.0);
+        assert!(codes(&project).is_empty());
+        set(&mut project, "perspective", 20.0, 0.0);
+        assert_eq!(codes(&project), ["line-bent"]);
     }
 
     #[test]

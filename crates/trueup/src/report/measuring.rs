@@ -2,10 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Vector2;
 use trueup_align::metrics::{
     self, MatchedPair, Outside, Straightness, expected_magnitude, folded_cells, mean_relative_turn, rectangle_rotation,
 };
 use trueup_align::similarity::EstimatedRoll;
+use trueup_compose::layout::CanvasLayout;
+use trueup_core::lines::LineSegment;
+use trueup_core::matches::PointMatch;
 use trueup_core::mesh::GridMesh;
 
 use super::evidence::{Evidence, EvidenceLine, EvidencePair, EvidencePhotograph};
@@ -30,6 +34,22 @@ struct Lean {
     by: EstimatedRoll,
 }
 
+/// The part of the plane that a panorama shows: its canvas, all round where that is a turn. What lies beside it is not measured, since
+/// nobody sees it.
+#[derive(Debug, Clone, Copy)]
+struct ShownPart {
+    size: [f64; 2],
+    is_turn: bool,
+}
+
+impl ShownPart {
+    /// Whether a place, in pixels of the canvas, is shown; nowhere that is not a number.
+    fn holds(&self, place: Vector2<f64>) -> bool {
+        let [width, height] = self.size;
+        (0.0..=height).contains(&place.y) && place.x.is_finite() && (self.is_turn || (0.0..=width).contains(&place.x))
+    }
+}
+
 impl Lean {
     fn is_certain(&self) -> bool {
         self.by.within <= WIDEST_DEG.to_radians()
@@ -40,6 +60,8 @@ impl Lean {
 /// their names are asked.
 pub(crate) fn run(evidence: &Evidence, arrangement: &Arrangement, images: &[ImageRecord]) -> Measures {
     let period = arrangement.drawn.period.map(|columns| columns as f64);
+    let CanvasLayout { width, height, .. } = arrangement.drawn;
+    let shown = ShownPart { size: [width as f64, height as f64], is_turn: period.is_some() };
     let turn = arrangement.projection.as_ref().and_then(|projection| projection.turn_px());
     let whole: Vec<GridMesh> =
         arrangement.delivered.iter().map(|mesh| metrics::without_torn_cells(mesh, turn)).collect();
@@ -49,11 +71,13 @@ pub(crate) fn run(evidence: &Evidence, arrangement: &Arrangement, images: &[Imag
         .zip(&evidence.photographs)
         .map(|(mesh, one)| GridMesh { width: one.frame.width, height: one.frame.height, ..mesh.clone() })
         .collect();
-    let leans: Vec<Option<Lean>> = working.iter().zip(&evidence.photographs).map(lean).collect();
+    let leans: Vec<Option<Lean>> =
+        working.iter().zip(&evidence.photographs).map(|(mesh, one)| lean(mesh, one, shown)).collect();
     let certain: Vec<Option<Lean>> = leans.iter().map(|one| one.filter(Lean::is_certain)).collect();
-    let matched = matched_pairs(evidence, &whole);
+    let matched = matched_pairs(evidence, &whole, shown);
     let pairs = pair_measures(evidence, &matched, period);
-    let lines: Vec<Vec<MeasuredLine>> = evidence.photographs.iter().zip(&working).map(measured_lines).collect();
+    let lines: Vec<Vec<MeasuredLine>> =
+        evidence.photographs.iter().zip(&working).map(|(one, mesh)| measured_lines(one, mesh, shown)).collect();
     let path = |photograph: usize| images[evidence.photographs[photograph].position].path.clone();
     let distortion = metrics::local_distortion(&working, Outside::Center, period);
     Measures {
@@ -84,9 +108,14 @@ pub(crate) fn run(evidence: &Evidence, arrangement: &Arrangement, images: &[Imag
 
 /// The lean of a photograph whose vertical the lines of all of them tell, on its grid. `None` where too few of its own carry it: nothing there would be
 /// seen to lean.
-fn lean((mesh, photograph): (&GridMesh, &EvidencePhotograph)) -> Option<Lean> {
+fn lean(mesh: &GridMesh, photograph: &EvidencePhotograph, part: ShownPart) -> Option<Lean> {
     let by = photograph.roll?;
-    let lean = metrics::drawn_lean(mesh, &photograph.camera, &by.down, &photograph.vertical_lines)?;
+    let is_shown = |line: &&LineSegment| {
+        let middle = Vector2::from(line.start).lerp(&line.end.into(), 0.5);
+        part.holds(mesh.warp(middle))
+    };
+    let lines: Vec<LineSegment> = photograph.vertical_lines.iter().filter(is_shown).copied().collect();
+    let lean = metrics::drawn_lean(mesh, &photograph.camera, &by.down, &lines)?;
     Some(Lean { lean, by })
 }
 
@@ -117,10 +146,13 @@ fn estimated_inconsistency(certain: &[Option<Lean>], meshes: &[GridMesh], refere
     mean_relative_turn(&rotations, &gammas, reference).map(f64::to_degrees)
 }
 
-/// The matches that were to coincide, on the grids.
-fn matched_pairs<'a>(evidence: &Evidence, meshes: &'a [GridMesh]) -> Vec<MatchedPair<'a>> {
-    let matched =
-        |pair: &EvidencePair| MatchedPair { a: &meshes[pair.a], b: &meshes[pair.b], matches: pair.matches.clone() };
+/// The matches that were to coincide, on the grids, as far as one of the two places is shown.
+fn matched_pairs<'a>(evidence: &Evidence, meshes: &'a [GridMesh], part: ShownPart) -> Vec<MatchedPair<'a>> {
+    let matched = |pair: &EvidencePair| {
+        let (a, b) = (&meshes[pair.a], &meshes[pair.b]);
+        let is_shown = |one: &&PointMatch| part.holds(a.warp(one.in_a.into())) || part.holds(b.warp(one.in_b.into()));
+        MatchedPair { a, b, matches: pair.matches.iter().filter(is_shown).copied().collect() }
+    };
     evidence.pairs.iter().map(matched).collect()
 }
 
@@ -183,7 +215,10 @@ fn reprojection(
 }
 
 /// The long lines of a photograph, as far as the panorama shows them whole.
-fn measured_lines((photograph, working): (&EvidencePhotograph, &GridMesh)) -> Vec<MeasuredLine> {
+fn measured_lines(photograph: &EvidencePhotograph, working: &GridMesh, part: ShownPart) -> Vec<MeasuredLine> {
+    let is_shown = |line: &&EvidenceLine| {
+        [line.segment.start, line.segment.end].into_iter().all(|end| part.holds(working.warp(end.into())))
+    };
     let full = |end: [f64; 2]| end.map(|coordinate| coordinate / photograph.frame.working_from_full);
     let measured = |line: &EvidenceLine| {
         let found = Straightness::of(&line.segment, &photograph.camera, working, metrics::LINE_STEP_PX)?;
@@ -196,7 +231,7 @@ fn measured_lines((photograph, working): (&EvidencePhotograph, &GridMesh)) -> Ve
             off_px: found.largest_px,
         })
     };
-    photograph.long_lines.iter().filter_map(measured).collect()
+    photograph.long_lines.iter().filter(is_shown).filter_map(measured).collect()
 }
 
 fn long_lines(lines: &[Vec<MeasuredLine>], path: impl Fn(usize) -> String) -> Option<LongLines> {
@@ -216,4 +251,40 @@ fn long_lines(lines: &[Vec<MeasuredLine>], path: impl Fn(usize) -> String) -> Op
             off_px: line.off_px,
         }),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::StageContext;
+
+    use crate::job::inputs::Inputs;
+    use crate::options::StitchOptions;
+    use crate::pipeline::Stitcher;
+
+    /// A narrow view into the middle of the room: the photographs at its ends are not in it.
+    #[test]
+    fn what_the_view_does_not_show_is_not_measured() {
+        let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
+        let mut options = StitchOptions::default();
+        for assignment in ["canvas.scale=0.2", "projection.kind=perspective", "projection.fov=20"] {
+            options.set(assignment).expect("an option");
+        }
+        let context = StageContext::default();
+        let aligned = Stitcher::new(&options, &context).align(&Inputs::new([room])).expect("a panorama");
+        let project = &aligned.alignments[0].project;
+        let is_left_out = |path: &str| {
+            let index = project.images.iter().position(|image| image.path == path);
+            let subject = index.map(trueup_core::diagnostics::Subject::Photograph);
+            project
+                .diagnostics
+                .iter()
+                .any(|one| one.code == "projection-left-out" && Some(&one.subject) == subject.as_ref())
+        };
+        let measures = project.measures.as_ref().expect("measures");
+        let (unseen, seen): (Vec<_>, Vec<_>) = measures.photographs.iter().partition(|one| is_left_out(&one.path));
+        assert!(!unseen.is_empty() && seen.iter().any(|one| one.lean_deg.is_some()), "{measures:?}");
+        for one in unseen {
+            assert!(one.lean_deg.is_none() && one.lines.is_empty(), "{one:?}");
+        }
+    }
 }
