@@ -126,7 +126,7 @@ fn fitted(
 ) -> Result<CanvasLayout> {
     let (mut low, mut high) = bounds(&placed);
     if frame.period.is_some_and(|period| period.is_nan() || period <= 0.0) {
-        return Err(Error::unsolvable(STAGE, "the canvas", "its period is not a length", "Choose another method."));
+        return Err(Error::unsolvable(STAGE, "a full turn", "its period is not a length", "Choose another method."));
     }
     if let Some(period) = frame.period {
         low.x = frame.window.map_or(0.5 * (low.x + high.x - period), |[window_low, _]| window_low.x);
@@ -156,7 +156,7 @@ fn fitted(
                 "Leave out the photographs that are not part of the scene.",
             ),
         };
-        return Err(Error::unsolvable(STAGE, "the canvas", reason, hint));
+        return Err(Error::unsolvable(STAGE, "all photographs", reason, hint));
     }
     let max_pixels = most_pixels(&placed, options);
     let wanted = frame.canvas_from_target;

@@ -157,9 +157,11 @@ pub fn check_place(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Refuses a folder where a file is to be.
+/// Refuses a folder where a file is to be, and what names one by its end.
 pub(crate) fn refuse_folder(path: &Path) -> Result<()> {
-    match path.is_dir() {
+    let names_one =
+        path.as_os_str().as_encoded_bytes().last().is_some_and(|&last| std::path::is_separator(last.into()));
+    match path.is_dir() || names_one {
         true => Err(Error::input(path.display(), "it is a folder", "Give the name of a file in it.")),
         false => Ok(()),
     }
@@ -222,6 +224,14 @@ mod tests {
         let desk = tempfile::tempdir().expect("a folder");
         let file = desk.path().join("pano.jpg");
         assert_eq!(PendingFile::create(&file).expect("possible").place(), resolved(&file));
+    }
+
+    #[test]
+    fn what_ends_as_the_name_of_a_folder_is_no_file() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let message = check_place(&desk.path().join("pano.jpg/")).expect_err("a folder").to_string();
+        assert!(message.contains("pano.jpg/: it is a folder"), "{message}");
+        assert!(check_place(&desk.path().join("pano.jpg")).is_ok());
     }
 
     #[cfg(unix)]

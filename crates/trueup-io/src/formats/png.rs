@@ -163,10 +163,24 @@ fn header(input: &mut Input) -> std::result::Result<png::Reader<&mut Input>, Dec
 }
 
 fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
-    let reader = header(input).map_err(HeaderError::damaged)?;
+    let reader = header(input).map_err(|error| HeaderError::damaged(words(&error)))?;
     let bits = if reader.output_color_type().1 == BitDepth::Sixteen { 16 } else { 8 };
     let (width, height) = reader.info().size();
     Ok(StoredPixels { width: width as usize, height: height as usize, bits, is_float: false })
+}
+
+/// What is wrong with a file, in words of people where the decoder's are of its own parts.
+fn words(error: &DecodingError) -> String {
+    match error {
+        DecodingError::IoError(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => {
+            "the file ends within it".to_owned()
+        }
+        DecodingError::LimitsExceeded => "it claims more than memory can hold".to_owned(),
+        other => match other.to_string() {
+            said if said.starts_with("CRC error") => "a checksum in it is wrong: bytes of it have changed".to_owned(),
+            said => said,
+        },
+    }
 }
 
 /// What the code points of the chunk cICP say.
@@ -200,7 +214,7 @@ fn exif(input: &mut Input) -> Option<ExifFields> {
 }
 
 fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
-    let failed = |error: DecodingError| damaged(source, error);
+    let failed = |error: DecodingError| damaged(source, words(&error));
     let limit = usize::try_from(decoding_limit(source)).unwrap_or(usize::MAX);
     let input = Ended::new(&mut input).map_err(|error| failed(error.into()))?;
     let mut reader = decoder(input, limit, false).map_err(failed)?;
@@ -296,6 +310,26 @@ mod tests {
 
     use super::*;
     use crate::formats::specimens::Specimen;
+
+    #[test]
+    fn what_is_wrong_with_a_file_is_told_in_words() {
+        let whole = Specimen::eight(24, 18, |x, y| [x as u8, y as u8, 9]).png(None);
+        let said = |bytes: &[u8]| {
+            let mut file = tempfile::tempfile().expect("a file");
+            file.write_all(bytes).expect("written");
+            let mut input = BufReader::new(file);
+            input.rewind().expect("its start");
+            match stored(&mut input) {
+                Err(HeaderError::Damaged(words)) => words,
+                other => panic!("{other:?}"),
+            }
+        };
+        // The width is in the first chunk, behind the signature and the chunk's length and name.
+        let mut changed = whole.clone();
+        changed[19] ^= 1;
+        assert_eq!(said(&changed), "a checksum in it is wrong: bytes of it have changed");
+        assert_eq!(said(&whole[..20]), "the file ends within it");
+    }
 
     /// A few bytes may stand for a profile as long as memory.
     #[test]

@@ -18,6 +18,9 @@ pub(super) const OWN_PANORAMA: &str = "own-panorama";
 /// The code of panoramas that something else made, by what the file says or by what it shows.
 pub const PANORAMA_OF_OTHERS: &str = "panorama-of-others";
 
+/// What people can do who want a panorama among the photographs. Beside those that it shows, it would be left out by what it shows.
+const NAME_ITSELF: &str = "If it is to be stitched all the same, name the file itself, and beside what it was made of its overlaps in a --graph file.";
+
 /// A picture whose header was read, and whose size is accepted.
 pub(super) struct OpenedPicture {
     pub(super) path: PathBuf,
@@ -58,18 +61,10 @@ pub(super) fn open_picture(
         HeaderError::Foreign(foreign) => not_read(foreign),
     })?;
     if named == Named::ByItsFolder && header.exif.is_by_this_program() {
-        return Err(Rejection::new(
-            OWN_PANORAMA,
-            "it is a panorama that this program made",
-            "Name the file itself if it is to be stitched all the same.",
-        ));
+        return Err(Rejection::new(OWN_PANORAMA, "it is a panorama that this program made", NAME_ITSELF));
     }
     if named == Named::ByItsFolder && header.exif.is_panorama_of_others() {
-        return Err(Rejection::new(
-            PANORAMA_OF_OTHERS,
-            "it says that it is a panorama, not a photograph",
-            "Name the file itself if it is to be stitched all the same.",
-        ));
+        return Err(Rejection::new(PANORAMA_OF_OTHERS, "it says that it is a panorama, not a photograph", NAME_ITSELF));
     }
     check_size([header.stored.width, header.stored.height], options, min_side_px)?;
     Ok(OpenedPicture { path, length, header })
@@ -149,10 +144,12 @@ pub(super) fn check_size(
 ) -> Result<(), Rejection> {
     let megapixels = width as f64 * height as f64 / 1e6;
     if megapixels > options.max_megapixels {
+        // As many decimals as tell a small picture from nothing.
+        let decimals = if megapixels < 10.0 { 2 } else { 0 };
         return Err(Rejection::new(
             "picture-too-large",
             format!(
-                "{width} x {height} px are {megapixels:.0} megapixels, at most {} are accepted",
+                "{width} x {height} px are {megapixels:.decimals$} megapixels, at most {} are accepted",
                 options.max_megapixels
             ),
             "Export a smaller copy, or raise source.max_megapixels if the photograph is truly this large.",

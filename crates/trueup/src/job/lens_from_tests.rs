@@ -63,3 +63,12 @@ fn a_lens_is_for_its_shape_its_camera_and_its_setting() {
     let other = SourceImage { camera_model: Some("Other".to_owned()), ..image(300, 200, 1) };
     assert!(lens_for(&mine, &other).is_err() && lens_for(&mine, &image(300, 200, 1)).is_ok());
 }
+
+#[test]
+fn a_photograph_in_place_of_a_project_is_refused_in_words() {
+    let desk = tempfile::tempdir().expect("a folder");
+    let file = desk.path().join("photo.jpg");
+    std::fs::write(&file, [0xff, 0xd8, 0xff]).expect("written");
+    let message = tell_lenses(&file, &mut [], &StageContext::default()).expect_err("no project").to_string();
+    assert!(message.contains("photo.jpg: it is no project, but no text at all. Give a file that"), "{message}");
+}

@@ -127,9 +127,31 @@ pub(crate) fn none_usable(inputs: Vec<(String, String, String)>) -> Error {
             Error::input(
                 format!("{} files", inputs.len()),
                 format!("none of them can be used: {}", several(&reasons)),
-                "Name at least two overlapping photographs, or a folder that holds them.",
+                hint_of_all(inputs.iter().map(|(_, _, hint)| hint.as_str())),
             )
         }
+    }
+}
+
+/// What to do where nothing can be used: what is said of each file, if that is one thing but for the command that does it, of which each is named.
+fn hint_of_all<'a>(hints: impl Iterator<Item = &'a str>) -> String {
+    /// What stands before a command.
+    const COMMAND: &str = "for example with ";
+    let mut different: Vec<&str> = Vec::new();
+    for hint in hints.filter(|hint| !hint.is_empty()) {
+        if !different.contains(&hint) {
+            different.push(hint);
+        }
+    }
+    let parts: Option<Vec<(&str, &str)>> = different.iter().map(|hint| hint.split_once(COMMAND)).collect();
+    match (different.as_slice(), parts.as_deref()) {
+        ([one], _) => (*one).to_owned(),
+        (_, Some([(before, first), others @ ..])) if others.iter().all(|(other, _)| other == before) => {
+            let commands = std::iter::once(first).chain(others.iter().map(|(_, command)| command));
+            let commands: Vec<&str> = commands.map(|command| command.trim_end_matches('.')).collect();
+            format!("{before}{COMMAND}{}.", commands.join(" and "))
+        }
+        _ => "Name at least two overlapping photographs, or a folder that holds them.".to_owned(),
     }
 }
 
@@ -175,6 +197,18 @@ mod tests {
         let panorama = |of: &[usize]| reason(StrangerKind::Panorama { of: of.to_vec() });
         assert_eq!(panorama(&[0, 2]), "it is a panorama of 0.jpg and 2.jpg");
         assert_eq!(panorama(&[0, 1, 2]), "it is a panorama of 0.jpg, 2.jpg and 1 more");
+    }
+
+    #[test]
+    fn what_helps_with_all_files_is_told_once() {
+        let hint = |hints: &[&str]| hint_of_all(hints.iter().copied());
+        let general = "Name at least two overlapping photographs, or a folder that holds them.";
+        assert_eq!(hint(&["Look.", "Look."]), "Look.");
+        assert_eq!(hint(&["Look.", "Listen."]), general);
+        let convert = |format: &str| format!("Convert it to PNG, for example with `magick a.{format} a.png`.");
+        let both = "Convert it to PNG, for example with `magick a.bmp a.png` and `magick a.gif a.png`.";
+        assert_eq!(hint(&[&convert("bmp"), &convert("gif"), &convert("bmp")]), both);
+        assert_eq!(hint(&[&convert("bmp"), "Look."]), general);
     }
 
     #[test]
