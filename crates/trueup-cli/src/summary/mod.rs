@@ -13,7 +13,7 @@ mod tests;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use trueup::{FlatEvidence, FlatSceneRecord, LensKind, LineGuide, OptionValue, Project, Severity, Written};
+use trueup::{Crop, FlatEvidence, FlatSceneRecord, LensKind, LineGuide, OptionValue, Project, Severity, Written};
 
 use crate::words::file_size;
 
@@ -114,7 +114,16 @@ fn cropped(project: &Project) -> Option<String> {
     let lost = (crop.lost > 0.0).then(|| format!("{} of what the photographs cover was cut off", percent(crop.lost)));
     let filled = (crop.filled > 0.0).then(|| format!("{} of the panorama was filled", percent(crop.filled)));
     let told: Vec<String> = lost.into_iter().chain(filled).collect();
-    (!told.is_empty()).then(|| format!("{} (--crop none keeps all)", told.join(", ")))
+    let all = if is_cut_by_view(project) { "all that the view shows" } else { "all" };
+    (!told.is_empty()).then(|| format!("{} (--crop none keeps {all})", told.join(", ")))
+}
+
+/// The code of photographs that the view shows a part of.
+const CUT_BY_VIEW: &str = "projection-cut";
+
+/// Whether the view cuts off parts of photographs, which no crop brings back.
+fn is_cut_by_view(project: &Project) -> bool {
+    project.diagnostics.iter().any(|one| one.code == CUT_BY_VIEW)
 }
 
 /// How many of the photographs in the panorama are fused of how many exposures; `None` if none is.
@@ -223,19 +232,28 @@ fn upright(project: &Project) -> String {
 }
 
 /// Warnings, and with `verbose` notes, that are not told elsewhere; always, that another thing was drawn than the method means, or of other files
-/// than were named, and that a panorama is left with its ragged borders.
+/// than were named, that a photograph may lie on its side, where all is wanted what the view cuts off, and that a panorama is left with its ragged borders.
 fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool) {
     /// The codes of these notes.
-    const ALWAYS: [&str; 5] =
-        ["crop-too-small", "drawn-by-cameras", "frames-passed-over", "frames-taken", "raw-developed"];
+    const ALWAYS: [&str; 6] = [
+        "crop-too-small",
+        "drawn-by-cameras",
+        "frames-passed-over",
+        "frames-taken",
+        "orientation-tag-stale",
+        "raw-developed",
+    ];
+    // Who asks for all is to know what is missing all the same.
+    let wants_all = project.options.arrange.canvas.crop == Crop::None;
     let names = project.photograph_names();
     for diagnostic in &project.diagnostics {
         let label = match diagnostic.severity {
             Severity::Warning => "warning",
             Severity::Note => "note",
         };
-        let is_detail =
-            diagnostic.severity == Severity::Note && !verbose && !ALWAYS.contains(&diagnostic.code.as_str());
+        let code = diagnostic.code.as_str();
+        let is_wanted = verbose || ALWAYS.contains(&code) || (wants_all && code == CUT_BY_VIEW);
+        let is_detail = diagnostic.severity == Severity::Note && !is_wanted;
         if is_detail || tells_of_left_out(diagnostic, project) {
             continue;
         }

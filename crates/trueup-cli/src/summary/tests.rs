@@ -164,3 +164,20 @@ fn without_vertical_lines_the_summary_says_so() {
     assert!(printed.contains(told), "{printed}");
     assert!(printed.contains("; none of 12 long lines is bent\n"), "{printed}");
 }
+
+/// What may lay a panorama on its side is told to everybody; what the view cuts off, to who asks for all.
+#[test]
+fn notes_on_what_was_decided_for_the_user_are_told() {
+    let mut project = project();
+    let note = |code: &str, message: &str| {
+        trueup::Diagnostic::note(code, trueup::Subject::Photograph(0), message, "Set something.")
+    };
+    project.diagnostics.push(note("orientation-tag-stale", "the tag was not applied"));
+    project.diagnostics.push(note("projection-cut", "12 % of it lies outside of the view"));
+    let told = text(&project, None, false);
+    assert!(told.contains("note        a.jpg: the tag was not applied\n            Set something.\n"), "{told}");
+    assert!(!told.contains("outside of the view"), "{told}");
+    project.options.arrange.canvas.crop = Crop::None;
+    let told = text(&project, None, false);
+    assert!(told.contains("note        a.jpg: 12 % of it lies outside of the view\n"), "{told}");
+}
