@@ -1,7 +1,9 @@
 //! The table of bad inputs in docs/command-line.md holds what is really printed.
 
 use crate::full_turn::photographs;
-use crate::pictures::{claiming, digital_negative, noise, plain, put_street, street, street_truth};
+use crate::pictures::{
+    HEIGHT, WIDTH, claiming, digital_negative, noise, plain, put_street, street, street_pixels, street_truth,
+};
 use crate::run::{Desk, finish, trueup};
 
 const PAGE: &str = include_str!("../../../docs/command-line.md");
@@ -33,11 +35,13 @@ const MISTAKES: &[Mistake] = &[
     mistake("video without frames", &["stitch", "clip.mp4", "-o", "pano.jpg"]),
     mistake("empty file", &["stitch", "empty.jpg", "-o", "pano.jpg"]),
     mistake("truncated JPEG", &["stitch", "cut.jpg", "-o", "pano.jpg"]),
+    mistake("JPEG whose data were replaced", &["stitch", "holed.jpg", "-o", "pano.jpg"]),
     mistake("header that claims 60000 x 60000", &["stitch", "giant.jpg", "-o", "pano.jpg"]),
     mistake("8 x 8 pixels", &["stitch", "dot.jpg", "-o", "pano.jpg"]),
     mistake("several files, none usable", &["stitch", "text.jpg", "empty.jpg", "-o", "pano.jpg"]),
     mistake("too little memory", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--memory", "100MB"]),
     mistake("black photographs", &["stitch", "black.jpg", "white.jpg", "-o", "pano.jpg"]),
+    mistake("photograph and its small copy", &["stitch", "b.jpg", "small.png", "-o", "pano.jpg"]),
     mistake("unrelated photographs", &["stitch", "noise1.jpg", "noise2.jpg", "noise3.jpg", "-o", "pano.jpg"]),
     mistake(
         "a method that cannot place them",
@@ -89,6 +93,10 @@ const MISTAKES: &[Mistake] = &[
     mistake("comparison over a file", &["compare", "b.jpg", "c.jpg", "-o", "a.jpg"]),
     mistake("tally of other files", &["compare", "--tally", "other.json"]),
     mistake("mask of another size", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--mask", "b.jpg=dot.jpg"]),
+    mistake(
+        "name of several photographs",
+        &["stitch", "d1/x.jpg", "d2/x.jpg", "-o", "pano.jpg", "--mask", "x.jpg=dot.jpg"],
+    ),
     mistake("mask of no photograph", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--mask", "q.jpg=dot.jpg"]),
     mistake("mask without a name", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--mask", "dot.jpg"]),
     mistake("cache over a file", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--cache", "dot.jpg"]),
@@ -126,6 +134,17 @@ fn desk() -> Desk {
     desk.put("clip.mp4", b"\0\0\0\x20ftypisom\0\0\x02\0");
     desk.put("empty.jpg", "");
     desk.put("cut.jpg", &whole[..whole.len() / 2]);
+    let mut holed = whole.clone();
+    let (from, length) = (whole.len() / 4, 1024);
+    holed[from..from + length].fill(0);
+    desk.put("holed.jpg", holed);
+    for (folder, bytes) in ["d1", "d2"].iter().zip(street()) {
+        std::fs::create_dir(desk.join(folder)).expect("a folder");
+        desk.put(&format!("{folder}/x.jpg"), bytes);
+    }
+    let (width, height) = (WIDTH as u32, HEIGHT as u32);
+    let second = image::RgbImage::from_raw(width, height, street_pixels()[1].clone()).expect("its size");
+    image::imageops::thumbnail(&second, width / 2, height / 2).save(desk.join("small.png")).expect("written");
     desk.put("giant.jpg", claiming(whole, 60_000, 60_000));
     desk.put("dot.jpg", plain(8, 8, 90));
     desk.put("black.jpg", plain(320, 240, 0));

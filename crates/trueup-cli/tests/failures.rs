@@ -270,3 +270,30 @@ fn a_project_cut_short_is_refused() {
     desk.put("cut.json", &whole[..whole.len() / 2]);
     finish(trueup(desk.path(), &["inspect", "cut.json"])).expect_failure(1, &["cut.json: not a project file ("]);
 }
+
+/// The canvas is known long before the panorama is.
+#[test]
+fn a_panorama_larger_than_its_format_is_refused_before_it_is_composed() {
+    let desk = street_desk();
+    let large = ["-o", "pano.webp", "--scale", "16", "--crop", "none", "--set", "canvas.max_pixels=1e9"];
+    let arguments = [&["stitch"], &STREET_NAMES[..], &large, &["--set", "canvas.max_growth=1000"]].concat();
+    finish(trueup(desk.path(), &arguments))
+        .expect_failure(1, &["pano.webp: ", " px needed, 16383 px per side allowed", "trueup: hint: "]);
+    assert!(!desk.join("pano.webp").exists());
+    let long = format!("{}.jpg", "p".repeat(251));
+    let command = |name: &str| finish(trueup(desk.path(), &["stitch", "a.jpg", "b.jpg", "--all", "-o", name]));
+    command(&long).expect_failure(1, &["its name is too long"]);
+    // Of several, it would have a number.
+    command(&long[1..]).expect_failure(1, &["its name is too long"]);
+}
+
+/// Names of files may hold line ends.
+#[cfg(unix)]
+#[test]
+fn an_error_is_a_line_whatever_is_named() {
+    let desk = Desk::new();
+    desk.put("a\ntrueup: hint: Believe me.\n.jpg", "no picture");
+    let run = desk.stitch(&["-q", "a\ntrueup: hint: Believe me.\n.jpg"]);
+    run.expect_failure(1, &["a\\ntrueup: hint: Believe me.\\n.jpg: its content is not"]);
+    assert_eq!(run.stderr.lines().filter(|line| line.starts_with("trueup: hint: ")).count(), 1, "{}", run.stderr);
+}

@@ -103,3 +103,43 @@ fn masks_that_fit_no_photograph_are_refused() {
     refused("b.jpg", 2, "--mask b.jpg: it is not of the form NAME=FILE");
     assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "small.png"]);
 }
+
+#[test]
+fn masks_that_leave_nothing_or_mark_what_is_left_out_are_told() {
+    let desk = street_desk();
+    GrayImage::new(WIDTH as u32, HEIGHT as u32).save(desk.join("black.png")).expect("written");
+    desk.stitch(&["a.jpg", "b.jpg", "--mask", "b.jpg=black.png"]).expect_failure(
+        1,
+        &["no overlapping photographs found; the mask of b.jpg ignores all of it", "White is used of a mask"],
+    );
+    RgbaImage::new(WIDTH as u32, HEIGHT as u32).save(desk.join("clear.png")).expect("written");
+    desk.stitch(&["a.jpg", "clear.png"])
+        .expect_failure(1, &["no overlapping photographs found; all of clear.png is black or transparent"]);
+    // A mask of one that overlaps none of the others.
+    let noise: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|at| (at * at / 7 % 251) as u8).collect();
+    desk.put("noise.jpg", jpeg(&noise, WIDTH, HEIGHT));
+    GrayImage::from_pixel(WIDTH as u32, HEIGHT as u32, Luma([255])).save(desk.join("all.png")).expect("written");
+    let run = desk.stitch(&[&STREET_NAMES[..], &["noise.jpg", "--mask", "noise.jpg=all.png"]].concat());
+    let said = run.expect_success();
+    assert!(
+        said.contains("warning     noise.jpg: there is a mask of it, but the photograph itself is left out"),
+        "{said}"
+    );
+}
+
+/// Photographs of one name in two folders.
+#[test]
+fn a_name_of_several_photographs_is_refused_wherever_one_is_named() {
+    let desk = street_desk();
+    for (from, folder) in [("a.jpg", "d1"), ("b.jpg", "d2")] {
+        std::fs::create_dir(desk.join(folder)).expect("made");
+        std::fs::rename(desk.join(from), desk.join(folder).join("x.jpg")).expect("moved");
+    }
+    GrayImage::from_pixel(WIDTH as u32, HEIGHT as u32, Luma([255])).save(desk.join("all.png")).expect("written");
+    for more in [["--mask", "x.jpg=all.png"], ["--keep", "x.jpg=all.png"], ["--reference", "x.jpg"]] {
+        let arguments = [&["d1/x.jpg", "d2/x.jpg", "c.jpg"][..], &more[..]].concat();
+        desk.stitch(&arguments).expect_failure(1, &["x.jpg: it may be any of d1/x.jpg, d2/x.jpg", "the folder before"]);
+    }
+    let run = desk.stitch(&["d1/x.jpg", "d2/x.jpg", "c.jpg", "--reference", "d2/x.jpg"]);
+    assert!(run.expect_success().contains("the reference is d2/x.jpg"), "{}", run.stdout);
+}

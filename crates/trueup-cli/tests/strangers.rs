@@ -100,3 +100,44 @@ fn the_same_command_twice_writes_the_same_bytes() {
     assert!(run.expect_success().contains("made.jpg: it is a panorama that this program made"), "{}", run.stdout);
     assert!(first == desk.read("made.jpg"));
 }
+
+/// The small copy matches all over, and that is what is said, not that nothing overlaps.
+#[test]
+fn a_photograph_and_its_copy_alone_are_told_so() {
+    let desk = street_desk();
+    bare_copy(&desk, &second_photograph(), "small.png", 0.5);
+    desk.stitch(&["b.jpg", "small.png"]).expect_failure(
+        1,
+        &["no overlapping photographs found; small.png: it is a smaller copy of b.jpg\n", "neighboring views"],
+    );
+}
+
+/// Layers and seams lie beside the panorama, among the photographs: they are known by their maker and written again.
+#[test]
+fn what_is_written_beside_a_panorama_is_no_photograph_either() {
+    let desk = street_desk();
+    let outputs = ["made.jpg", "small.png", "seams.png", "layers.tif"];
+    let command = [
+        "stitch",
+        ".",
+        "-o",
+        outputs[0],
+        "--thumbnail",
+        outputs[1],
+        "--seams",
+        outputs[2],
+        "--layers",
+        outputs[3],
+        "--scale",
+        "0.5",
+    ];
+    finish(trueup(desk.path(), &command)).expect_success();
+    let first = outputs.map(|name| desk.read(name));
+    let run = finish(trueup(desk.path(), &command));
+    assert!(run.expect_success().contains("photographs 4 of 8 used"), "{}", run.stdout);
+    assert!(first == outputs.map(|name| desk.read(name)));
+    // They are none of another panorama's, either.
+    let run = finish(trueup(desk.path(), &["stitch", ".", "-o", "other.jpg", "--scale", "0.5"]));
+    assert!(run.expect_success().contains("photographs 4 of 8 used"), "{}", run.stdout);
+    assert!(desk.read("other.jpg") == first[0]);
+}
