@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 pub fn wrap_angle(angle: f64) -> f64 {
     // The remainder of what is hardly negative is rounded to a whole turn.
     let wrapped = (angle + PI).rem_euclid(TAU) - PI;
-    if wrapped < PI { wrapped } else { -PI }
+    if wrapped >= PI { -PI } else { wrapped }
 }
 
 /// The shortest of the lengths that differ from `length` by whole periods; itself without a period.
@@ -33,6 +33,7 @@ mod tests {
         assert_eq!(wrap_angle(PI), -PI);
         assert_eq!(wrap_angle(-PI), -PI);
         assert_eq!(wrap_angle((-PI).next_down()), -PI);
+        assert!(wrap_angle(f64::NAN).is_nan());
         assert!((wrap_angle(3.0 * PI + 0.1) - (0.1 - PI)).abs() < 1e-12);
     }
 
