@@ -15,6 +15,7 @@
 //! * **Determinism.** The same input, options and seed give the same bytes for any number of threads.
 #![forbid(unsafe_code)]
 
+pub mod called;
 pub mod camera;
 pub mod color;
 pub mod context;

@@ -10,6 +10,7 @@
 
 use std::path::Path;
 
+use trueup_core::called::{Called, any_of};
 use trueup_core::{Error, Result};
 
 /// What starts a comment.
@@ -123,17 +124,12 @@ fn keyed_line(fields: &str, count: usize, graph: &mut GraphFile) -> std::result:
 fn photograph(text: &str, photographs: &[&Path]) -> std::result::Result<usize, String> {
     let text = text.trim().trim_matches('"');
     let name = Path::new(text.trim_start_matches("./"));
-    let meant = |(at, path): (usize, &&Path)| (!text.is_empty() && path.ends_with(name)).then_some(at);
-    let meant: Vec<usize> = photographs.iter().enumerate().filter_map(meant).collect();
-    match meant[..] {
-        [] => index(text, photographs.len())
+    let files = photographs.iter().copied().enumerate().filter(|_| !text.is_empty());
+    match Called::by(name, files) {
+        Called::Nothing => index(text, photographs.len())
             .map_err(|_| format!("\"{text}\" is none of the {} photographs given", photographs.len())),
-        [found] => Ok(found),
-        // One may be at the very path that ends others'.
-        _ => photographs.iter().position(|path| *path == name).ok_or_else(|| {
-            let paths: Vec<String> = meant.iter().map(|&at| photographs[at].display().to_string()).collect();
-            format!("\"{text}\" may be any of {}", paths.join(", "))
-        }),
+        Called::One(found) => Ok(found),
+        Called::AnyOf(several) => Err(format!("\"{text}\" {}", any_of(several.iter().map(|&at| photographs[at])))),
     }
 }
 

@@ -1,5 +1,8 @@
 //! Photographs by the names that people call them.
 
+use std::path::Path;
+
+use trueup_core::called::{Called, any_of};
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
@@ -9,30 +12,26 @@ use trueup_core::{Error, Result};
 /// # Errors
 /// [`Error::Input`] if there is none, or if it may be any of several.
 pub(crate) fn photograph_named(images: &[SourceImage], name: &str, role: &str) -> Result<usize> {
-    let called = |is_called: &dyn Fn(&SourceImage) -> bool| -> Vec<usize> {
-        let any = |image: &SourceImage| is_called(image) || image.stack.iter().any(|member| is_called(&member.source));
-        (0..images.len()).filter(|&index| any(&images[index])).collect()
-    };
-    let exactly = called(&|image| image.name == name || image.path.as_os_str() == name);
-    if let Some(&found) = exactly.first() {
-        return Ok(found);
-    }
-    match called(&|image| image.path.ends_with(name))[..] {
-        [] => Err(Error::input(
+    match Called::by(Path::new(name), images.iter().enumerate().flat_map(files)) {
+        Called::Nothing => Err(Error::input(
             name,
             format!("no photograph of this name was given, {role}"),
             "Write the name of one of the photographs, with its extension.",
         )),
-        [found] => Ok(found),
-        ref several => {
-            let paths: Vec<String> = several.iter().map(|&index| images[index].path.display().to_string()).collect();
-            Err(Error::input(
-                name,
-                format!("it may be any of {}", paths.join(", ")),
-                "Write the folder before the name, as far as tells the photographs apart.",
-            ))
-        }
+        Called::One(found) => Ok(found),
+        Called::AnyOf(several) => Err(Error::input(
+            name,
+            format!("it {}", any_of(several.iter().map(|&at| images[at].path.as_path()))),
+            "Write the folder before the name, as far as tells the photographs apart.",
+        )),
     }
+}
+
+/// What photograph number `at` may be called by: the names and paths of its own file and of those of its stack.
+fn files((at, image): (usize, &SourceImage)) -> impl Iterator<Item = (usize, &Path)> {
+    let exposures = image.stack.iter().map(|member| &member.source);
+    let files = std::iter::once(image).chain(exposures);
+    files.flat_map(|file| [Path::new(&file.name), file.path.as_path()]).map(move |name| (at, name))
 }
 
 /// The photograph the user calls `name` for the reference: by name, by path, or by the end of its path.
