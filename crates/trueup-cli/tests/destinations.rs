@@ -161,6 +161,26 @@ fn pipes_are_written_through() {
     assert_eq!(read["format"], "trueup-project");
 }
 
+/// Each of an earlier run's pictures is called what it is.
+#[test]
+fn what_an_earlier_run_wrote_beside_its_panorama_is_left_out_by_what_it_is() {
+    let desk = street_desk();
+    let beside = ["--layers", "layers.tif", "--seams", "seams.png"];
+    let stitch = |photographs: &str| desk.stitch(&[&[photographs][..], &beside].concat());
+    stitch("*.jpg").expect_success();
+    let before = ["pano.jpg", "layers.tif", "seams.png"].map(|name| desk.read(name));
+    let run = stitch(".");
+    let said = run.expect_success();
+    for what in [
+        "pano.jpg: it is a panorama that this program made",
+        "layers.tif: it holds the layers of a panorama that this program made",
+        "seams.png: it shows the seams of a panorama that this program made",
+    ] {
+        assert!(said.contains(what), "{said}");
+    }
+    assert!(["pano.jpg", "layers.tif", "seams.png"].map(|name| desk.read(name)) == before);
+}
+
 /// The panorama of an earlier run lies among the photographs, and is made again.
 #[test]
 fn an_older_panorama_in_the_folder_is_left_out_and_written_again() {

@@ -11,8 +11,8 @@ use super::failure::WriteFailure;
 use super::format_tests::{Fine, pages, sixteen};
 use super::tests::FullDisk;
 use super::*;
-use crate::provenance::of_maker;
-use crate::source::is_own_panorama;
+use crate::provenance::{PanoramaPart, of_part};
+use crate::source::is_own_output;
 
 /// Two layers on a panorama of 400 x 300 pixels.
 struct TwoLayers;
@@ -39,8 +39,14 @@ fn layers_are_pages_with_a_place() {
     let path = folder.path().join("layers.tif");
     for layer_extent in [LayerExtent::Canvas, LayerExtent::Cropped] {
         let options = OutputOptions { layer_extent, depth: Depth::Sixteen, ..OutputOptions::default() };
-        let bytes = write_layers(&path, &TwoLayers, &of_maker(MetadataKept::Keep), &options, &StageContext::default())
-            .expect("written");
+        let bytes = write_layers(
+            &path,
+            &TwoLayers,
+            &of_part(PanoramaPart::Layers, MetadataKept::Keep),
+            &options,
+            &StageContext::default(),
+        )
+        .expect("written");
         assert_eq!(bytes, path.metadata().expect("a file").len());
         let mut file = pages(&path);
         for (index, [left, top]) in [[10, 20], [150, 200]].into_iter().enumerate() {
@@ -77,7 +83,7 @@ fn layers_are_pages_with_a_place() {
             assert_eq!([place(&mut file, 286), place(&mut file, 287)], corner.map(f64::from));
         }
         assert!(!file.more_images());
-        assert!(is_own_panorama(&path), "it is known by its maker");
+        assert!(is_own_output(&path), "it is known by its maker");
         let bytes = std::fs::read(&path).expect("a file");
         assert!(bytes.windows(10).any(|some| some == "Übung.tif".as_bytes()));
     }
@@ -120,12 +126,12 @@ fn labels_are_the_samples() {
         write_labels(
             &path,
             &Stripes(photographs),
-            &of_maker(MetadataKept::Keep),
+            &of_part(PanoramaPart::Seams, MetadataKept::Keep),
             &OutputOptions::default(),
             &StageContext::default(),
         )
         .expect("written");
-        assert!(is_own_panorama(&path), "it is known by its maker");
+        assert!(is_own_output(&path), "it is known by its maker");
         let mut decoder = png::Decoder::new(BufReader::new(File::open(&path).expect("a file")));
         decoder.set_transformations(png::Transformations::IDENTITY);
         let mut reader = decoder.read_info().expect("a PNG");

@@ -10,7 +10,7 @@ use trueup_core::source::RecordedExposure;
 
 use super::maker_note;
 use super::pose::StatedPose;
-use crate::provenance::description::SOFTWARE;
+use crate::provenance::description::{PanoramaPart, SOFTWARE};
 
 /// EXIF 3.0 tag numbers read from a TIFF's EXIF directory (section 4.6).
 const EXPOSURE_TIME: u16 = 0x829a;
@@ -70,6 +70,8 @@ pub(crate) struct ExifFields {
     pub(crate) model: Option<String>,
     /// LensModel, trimmed.
     pub(crate) lens_model: Option<String>,
+    /// ImageDescription, trimmed.
+    pub(crate) description: Option<String>,
     /// Software, trimmed.
     pub(crate) software: Option<String>,
     /// CustomRendered: 0 by the common processing, others by a special one.
@@ -110,6 +112,7 @@ impl ExifFields {
             make: text(Tag::Make),
             model: text(Tag::Model),
             lens_model: text(Tag::LensModel),
+            description: text(Tag::ImageDescription),
             software: text(Tag::Software),
             custom_rendered: value(Tag::CustomRendered).and_then(|value| value.get_uint(0)),
             color_space: value(Tag::ColorSpace).and_then(|value| value.get_uint(0)),
@@ -129,6 +132,7 @@ impl ExifFields {
             orientation: decoder.find_tag_unsigned(TiffTag::Orientation).ok().flatten(),
             make: text(decoder.find_tag(TiffTag::Make).ok().flatten()),
             model: text(decoder.find_tag(TiffTag::Model).ok().flatten()),
+            description: text(decoder.find_tag(TiffTag::ImageDescription).ok().flatten()),
             software: text(decoder.find_tag(TiffTag::Software).ok().flatten()),
             ..Self::default()
         };
@@ -187,6 +191,17 @@ impl ExifFields {
     pub(crate) fn is_by_this_program(&self) -> bool {
         let program = SOFTWARE.split_whitespace().next();
         self.software.as_deref().is_some_and(|software| software.split_whitespace().next() == program)
+    }
+
+    /// What of this program's the picture is, for a sentence, if it names it as its maker.
+    pub(crate) fn own_output(&self) -> Option<&'static str> {
+        let description = self.description.as_deref();
+        let part = PanoramaPart::ALL.into_iter().find(|part| description == Some(part.description()));
+        self.is_by_this_program().then_some(match part {
+            None => "it is a panorama that this program made",
+            Some(PanoramaPart::Layers) => "it holds the layers of a panorama that this program made",
+            Some(PanoramaPart::Seams) => "it shows the seams of a panorama that this program made",
+        })
     }
 
     /// Whether the picture names another program, or a camera's own processing, that makes panoramas.

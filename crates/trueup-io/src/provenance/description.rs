@@ -7,6 +7,28 @@ use trueup_core::spherical::SphericalFrame;
 /// The name the panorama bears as its maker.
 pub const SOFTWARE: &str = concat!("trueup ", env!("CARGO_PKG_VERSION"));
 
+/// What is written beside a panorama and shows as much of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PanoramaPart {
+    /// Every photograph by itself, as it lies on the panorama.
+    Layers,
+    /// Which photograph is shown where.
+    Seams,
+}
+
+impl PanoramaPart {
+    /// All of them.
+    pub(crate) const ALL: [Self; 2] = [Self::Layers, Self::Seams];
+
+    /// How its file describes itself.
+    pub(crate) const fn description(self) -> &'static str {
+        match self {
+            Self::Layers => "Layers of a panorama",
+            Self::Seams => "Seams of a panorama",
+        }
+    }
+}
+
 /// A finished panorama, as its metadata see it.
 #[derive(Debug, Clone, Copy)]
 pub struct PanoramaDescription<'a> {

@@ -1,4 +1,4 @@
-//! What a panorama tells of the photographs it is made of: EXIF and XMP; and what is written beside it, of its maker ([`of_maker`]).
+//! What a panorama tells of the photographs it is made of: EXIF and XMP; and what is written beside it, of its maker ([`of_part`]).
 //!
 //! [`describe`] gathers it from the files. Of the reference photograph come camera, lens and exposure; the time is that of
 //! the earliest photograph, and the place the reference's, or that of the first photograph that knows it.
@@ -22,7 +22,7 @@ use crate::metadata::header::read_fields;
 use fields::value;
 use taken::Moment;
 
-pub use description::{PanoramaDescription, SOFTWARE};
+pub use description::{PanoramaDescription, PanoramaPart, SOFTWARE};
 
 /// What one photograph's EXIF tells.
 struct Told {
@@ -84,13 +84,13 @@ pub fn describe(panorama: &PanoramaDescription<'_>, kept: MetadataKept) -> Metad
     Metadata { exif: record::block(&fields), icc: None, xmp }
 }
 
-/// The metadata of a picture that is written beside a panorama and is none itself (layers, seams), but for its color profile: that this
+/// The metadata of a picture that is written beside a panorama and is none itself, but for its color profile: what it is and that this
 /// program made it, so that a later run does not take it for a photograph.
-pub fn of_maker(kept: MetadataKept) -> Metadata {
+pub fn of_part(part: PanoramaPart, kept: MetadataKept) -> Metadata {
     match kept {
         MetadataKept::None => Metadata::default(),
         MetadataKept::Keep | MetadataKept::NoLocation => {
-            Metadata { exif: record::maker_block(), ..Metadata::default() }
+            Metadata { exif: record::part_block(part), ..Metadata::default() }
         }
     }
 }

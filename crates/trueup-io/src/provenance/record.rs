@@ -5,7 +5,7 @@ use std::io::Cursor;
 use exif::experimental::Writer;
 use exif::{Field, In, Rational, Tag, Value};
 
-use super::description::{PanoramaDescription, SOFTWARE};
+use super::description::{PanoramaDescription, PanoramaPart, SOFTWARE};
 use super::fields::is_of_place;
 use super::taken::Moment;
 
@@ -131,9 +131,10 @@ fn ascii(text: &str) -> Value {
     Value::Ascii(vec![text.as_bytes().to_vec()])
 }
 
-/// The block that names this program as the maker, and nothing else.
-pub(super) fn maker_block() -> Option<Vec<u8>> {
-    block(&[Field { tag: Tag::Software, ifd_num: In::PRIMARY, value: ascii(SOFTWARE) }])
+/// The block that says what is written beside a panorama, and names this program as the maker.
+pub(super) fn part_block(part: PanoramaPart) -> Option<Vec<u8>> {
+    let texts = [(Tag::ImageDescription, part.description()), (Tag::Software, SOFTWARE)];
+    block(&texts.map(|(tag, text)| Field { tag, ifd_num: In::PRIMARY, value: ascii(text) }))
 }
 
 /// The block of these fields; `None` if they cannot be written.

@@ -29,7 +29,7 @@ use duplicates::Accepted;
 use in_memory::in_memory_source;
 use inputs::Candidate;
 pub use opened::PANORAMA_OF_OTHERS;
-use opened::{Named, OWN_PANORAMA, OpenedPicture, check_size, open_picture};
+use opened::{Named, OWN_OUTPUT, OpenedPicture, check_size, open_picture};
 use rejection::Rejection;
 
 pub use crate::formats::{names_photograph, read_extensions, readable_formats};
@@ -75,8 +75,8 @@ impl RejectedSource {
     }
 
     /// Whether it was left out because an earlier run of this program made it.
-    pub fn is_own_panorama(&self) -> bool {
-        self.code == OWN_PANORAMA
+    pub fn is_own_output(&self) -> bool {
+        self.code == OWN_OUTPUT
     }
 }
 
@@ -162,7 +162,7 @@ fn scan_candidates(
 pub fn files(inputs: &[String], in_memory: &InMemory) -> Vec<PathBuf> {
     let file = |candidate| match candidate {
         Candidate::File(path) => Some(path),
-        Candidate::Found(path) => Some(path).filter(|path| !is_own_panorama(path)),
+        Candidate::Found(path) => Some(path).filter(|path| !is_own_output(path)),
         Candidate::InMemory(..) | Candidate::Rejected(..) => None,
     };
     inputs::expand(inputs, in_memory).into_iter().filter_map(file).collect()
@@ -190,8 +190,8 @@ fn is_readable(path: &Path) -> bool {
     names_photograph(path) && path.is_file() && formats::foreign_file(path).is_none() && header::open(path).is_some()
 }
 
-/// Whether the file at `path` says that this program made it.
-pub fn is_own_panorama(path: &Path) -> bool {
+/// Whether the file at `path` says that this program made it: a panorama, its layers or its seams.
+pub fn is_own_output(path: &Path) -> bool {
     exif_of(path).is_some_and(|exif| exif.is_by_this_program())
 }
 

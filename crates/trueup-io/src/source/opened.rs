@@ -12,8 +12,8 @@ use crate::metadata::header::{Header, read_header};
 /// The largest file that is opened. Files are read into memory to be decoded; no photograph is this large.
 const MAX_FILE_BYTES: u64 = 4 << 30;
 
-/// The code of panoramas among the photographs of a folder.
-pub(super) const OWN_PANORAMA: &str = "own-panorama";
+/// The code of panoramas among the photographs of a folder, and of their layers and seams.
+pub(super) const OWN_OUTPUT: &str = "own-panorama";
 
 /// The code of panoramas that something else made, by what the file says or by what it shows.
 pub const PANORAMA_OF_OTHERS: &str = "panorama-of-others";
@@ -60,8 +60,8 @@ pub(super) fn open_picture(
         ),
         HeaderError::Foreign(foreign) => not_read(foreign),
     })?;
-    if named == Named::ByItsFolder && header.exif.is_by_this_program() {
-        return Err(Rejection::new(OWN_PANORAMA, "it is a panorama that this program made", NAME_ITSELF));
+    if let Some(what) = header.exif.own_output().filter(|_| named == Named::ByItsFolder) {
+        return Err(Rejection::new(OWN_OUTPUT, what, NAME_ITSELF));
     }
     if named == Named::ByItsFolder && header.exif.is_panorama_of_others() {
         return Err(Rejection::new(PANORAMA_OF_OTHERS, "it says that it is a panorama, not a photograph", NAME_ITSELF));

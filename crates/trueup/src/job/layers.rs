@@ -7,7 +7,7 @@ use trueup_compose::render::{self, Rendered};
 use trueup_compose::seam::{NOBODY, Seams};
 use trueup_core::{Error, Result};
 use trueup_io::encode::{self, LabelMap, LayerPage, LayerSet, Metadata, OutputOptions};
-use trueup_io::provenance;
+use trueup_io::provenance::{self, PanoramaPart};
 
 use crate::pipeline::{Alignment, Stitcher};
 
@@ -50,7 +50,10 @@ impl Stitcher<'_> {
         let layout = alignment.kept_layout();
         let shown = shown(&layout);
         let layers = Layers { stitcher: self, alignment, layout, shown };
-        let metadata = Metadata { icc: self.metadata(alignment).icc, ..provenance::of_maker(options.metadata) };
+        let metadata = Metadata {
+            icc: self.metadata(alignment).icc,
+            ..provenance::of_part(PanoramaPart::Layers, options.metadata)
+        };
         encode::write_layers(path, &layers, &metadata, &options, self.context())
     }
 
@@ -63,7 +66,13 @@ impl Stitcher<'_> {
         let seams = rendered.seams.as_ref().ok_or_else(no_seams)?;
         let labels = Labels { alignment, seams };
         let options = &self.options().compose.output;
-        encode::write_labels(path, &labels, &provenance::of_maker(options.metadata), options, self.context())
+        encode::write_labels(
+            path,
+            &labels,
+            &provenance::of_part(PanoramaPart::Seams, options.metadata),
+            options,
+            self.context(),
+        )
     }
 }
 

@@ -147,7 +147,7 @@ impl Outputs {
     pub(crate) fn stale(&self, count: usize) -> Vec<PathBuf> {
         let first = if count > 1 { count + 1 } else { 1 };
         let numbered = (first..).map(|number| self.numbered(Some(number)).panorama);
-        numbered.take_while(|path| source::is_own_panorama(path)).collect()
+        numbered.take_while(|path| source::is_own_output(path)).collect()
     }
 
     /// The panorama's file and those beside it.

@@ -124,7 +124,7 @@ impl Outputs {
         place: impl Fn(&str) -> Option<PathBuf>,
     ) -> Result<()> {
         let of_image = |image: &ImageRecord| {
-            let own = place(&image.path).filter(|path| !is_older_panorama(image, path));
+            let own = place(&image.path).filter(|path| !is_older_output(image, path));
             let others = image.stack.iter().filter_map(|member| place(&member.path));
             let photographs = own.into_iter().chain(others).map(|path| (path, ReadFile::Photograph));
             let masks = image.masks.iter().filter_map(|mask| Some((place(&mask.path)?, ReadFile::Mask)));
@@ -135,9 +135,9 @@ impl Outputs {
     }
 }
 
-/// Whether a photograph, at `path`, was left out because it is none: a panorama of an earlier run, which may be written over.
-fn is_older_panorama(image: &ImageRecord, path: &Path) -> bool {
-    image.status == ImageStatus::LeftOut && source::is_own_panorama(path)
+/// Whether a photograph, at `path`, was left out because it is none: a panorama of an earlier run or a part of it, which may be written over.
+fn is_older_output(image: &ImageRecord, path: &Path) -> bool {
+    image.status == ImageStatus::LeftOut && source::is_own_output(path)
 }
 
 impl Written {

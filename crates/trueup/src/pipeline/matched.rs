@@ -310,7 +310,7 @@ impl Matched {
     pub(crate) fn require_all(&self, stitched: &[Vec<usize>]) -> Result<()> {
         let images = &self.set.images;
         // A panorama of an earlier run is no photograph that was given.
-        let rejected: Vec<&RejectedSource> = self.set.rejected.iter().filter(|one| !one.is_own_panorama()).collect();
+        let rejected: Vec<&RejectedSource> = self.set.rejected.iter().filter(|one| !one.is_own_output()).collect();
         let used: usize = stitched.iter().map(Vec::len).sum();
         let given = images.len() + rejected.len();
         if used == given {
