@@ -90,16 +90,16 @@ pub(super) fn misaligned_share(points: &[PairMatches], grids: &CurrentGrids) -> 
         matched(pair).step_by(step).map(|(_, ends)| point_gap(pair, ends, grids)).collect()
     };
     let gaps: Vec<Vec<OverlapGap>> = points.par_iter().map(gaps).collect();
-    let all: Vec<Vec<OverlapGap>> = gaps.iter().map(|gaps| gaps.iter().map(believed).collect()).collect();
-    if !evidence::is_beyond_noise(&all) {
+    let shortened: Vec<Vec<OverlapGap>> = gaps.iter().map(|gaps| gaps.iter().map(believed).collect()).collect();
+    if !evidence::is_beyond_noise(&shortened) {
         return 0.0;
     }
     let share = |common: f64| evidence::share(common, FULL_PX);
-    let shares = |gaps: &Vec<OverlapGap>| -> (usize, f64) {
-        let asked: Vec<OverlapGap> = evidence::still(gaps).map(|k| believed(&gaps[k])).collect();
+    let shares = |(gaps, shortened): (&Vec<OverlapGap>, &Vec<OverlapGap>)| -> (usize, f64) {
+        let asked: Vec<OverlapGap> = evidence::still(gaps).map(|k| shortened[k]).collect();
         (asked.len(), evidence::common_squares(&asked).into_iter().map(share).sum())
     };
-    let shares: Vec<(usize, f64)> = gaps.par_iter().map(shares).collect();
+    let shares: Vec<(usize, f64)> = gaps.par_iter().zip(&shortened).map(shares).collect();
     let counted: usize = shares.iter().map(|&(asked, _)| asked).sum();
     shares.into_iter().map(|(_, share)| share).sum::<f64>() / counted.max(1) as f64
 }
