@@ -41,7 +41,7 @@ pub use options::{
     AlignOptions, ArrangeOptions, ChangedOption, ComposeOptions, Evidence, MatchOptions, MeasureOptions, Method, Phase,
     RandomOptions, ResourceOptions, RunOptions, ShapeOptions, StitchOptions, Structure, WorkingOptions,
 };
-pub use pipeline::{Aligned, Alignment, MatchedPhotographs, Stitcher};
+pub use pipeline::{Aligned, Alignment, MatchedPhotographs, PROJECTION_CUT, Stitcher};
 pub use project::{
     Canvas, CropRecord, FlatSceneRecord, HuginImage, HuginProject, ImageRecord, ImageStatus, LevelRecord, LineGuide,
     ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, ProjectionRecord,
@@ -75,6 +75,6 @@ pub use trueup_io::encode::{
     Depth, Metadata, OutputOptions, abandon_unfinished, abandon_unfinished_soon, check_place, same_place,
     write as write_picture, write_atomically, written_extensions,
 };
-pub use trueup_io::source::{InMemory, names_photograph, read_extensions, readable_formats};
+pub use trueup_io::source::{InMemory, ORIENTATION_TAG_STALE, names_photograph, read_extensions, readable_formats};
 pub use trueup_io::text;
 pub use workers::{TakeResult, Worker, Workers};

@@ -13,7 +13,10 @@ mod tests;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use trueup::{Crop, FlatEvidence, FlatSceneRecord, LensKind, LineGuide, OptionValue, Project, Severity, Written};
+use trueup::{
+    Crop, FlatEvidence, FlatSceneRecord, LensKind, LineGuide, ORIENTATION_TAG_STALE, OptionValue, PROJECTION_CUT,
+    Project, Severity, Written,
+};
 
 use crate::words::file_size;
 
@@ -118,12 +121,9 @@ fn cropped(project: &Project) -> Option<String> {
     (!told.is_empty()).then(|| format!("{} (--crop none keeps {all})", told.join(", ")))
 }
 
-/// The code of photographs that the view shows a part of.
-const CUT_BY_VIEW: &str = "projection-cut";
-
 /// Whether the view cuts off parts of photographs, which no crop brings back.
 fn is_cut_by_view(project: &Project) -> bool {
-    project.diagnostics.iter().any(|one| one.code == CUT_BY_VIEW)
+    project.diagnostics.iter().any(|one| one.code == PROJECTION_CUT)
 }
 
 /// How many of the photographs in the panorama are fused of how many exposures; `None` if none is.
@@ -240,7 +240,7 @@ fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool) {
         "drawn-by-cameras",
         "frames-passed-over",
         "frames-taken",
-        "orientation-tag-stale",
+        ORIENTATION_TAG_STALE,
         "raw-developed",
     ];
     // Who asks for all is to know what is missing all the same.
@@ -252,7 +252,7 @@ fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool) {
             Severity::Note => "note",
         };
         let code = diagnostic.code.as_str();
-        let is_wanted = verbose || ALWAYS.contains(&code) || (wants_all && code == CUT_BY_VIEW);
+        let is_wanted = verbose || ALWAYS.contains(&code) || (wants_all && code == PROJECTION_CUT);
         let is_detail = diagnostic.severity == Severity::Note && !is_wanted;
         if is_detail || tells_of_left_out(diagnostic, project) {
             continue;

@@ -172,8 +172,8 @@ fn notes_on_what_was_decided_for_the_user_are_told() {
     let note = |code: &str, message: &str| {
         trueup::Diagnostic::note(code, trueup::Subject::Photograph(0), message, "Set something.")
     };
-    project.diagnostics.push(note("orientation-tag-stale", "the tag was not applied"));
-    project.diagnostics.push(note("projection-cut", "12 % of it lies outside of the view"));
+    project.diagnostics.push(note(ORIENTATION_TAG_STALE, "the tag was not applied"));
+    project.diagnostics.push(note(PROJECTION_CUT, "12 % of it lies outside of the view"));
     let told = text(&project, None, false);
     assert!(told.contains("note        a.jpg: the tag was not applied\n            Set something.\n"), "{told}");
     assert!(!told.contains("outside of the view"), "{told}");

@@ -88,7 +88,7 @@ impl RejectedSource {
 /// this program made are left out: they are of an earlier run, of the photographs beside them. Everything else that cannot be used is listed in [`Sources::rejected`], and the good files beside it are used all the same.
 /// Of the same file given twice, or of two files with the same bytes, the first is used.
 ///
-/// A stale orientation tag is reported as the note `orientation-tag-stale`.
+/// A stale orientation tag is reported as the note [`ORIENTATION_TAG_STALE`].
 ///
 /// # Errors
 /// [`Error::Options`] for options out of range, [`Error::Cancelled`]. Never for what is in the files.
@@ -264,10 +264,13 @@ fn examine(
     })
 }
 
+/// The code of photographs whose orientation tag was not applied.
+pub const ORIENTATION_TAG_STALE: &str = "orientation-tag-stale";
+
 fn stale_tag_note(number: usize, header: &Header) -> Diagnostic {
     let tag = header.exif.orientation.unwrap_or(1);
     Diagnostic::note(
-        "orientation-tag-stale",
+        ORIENTATION_TAG_STALE,
         Subject::Photograph(number),
         format!(
             "the EXIF orientation tag ({tag}, a quarter turn) was not applied: the pixels are stored upright already, \

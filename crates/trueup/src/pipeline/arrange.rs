@@ -26,6 +26,9 @@ use crate::options::ArrangeOptions;
 use crate::project::projection::{ProjectionRecord, WHOLE_SPHERE};
 use crate::project::record::{ImageRecord, Project};
 
+/// The code of photographs of which the view shows a part.
+pub const PROJECTION_CUT: &str = "projection-cut";
+
 /// What the phase works on.
 #[derive(Debug, Clone)]
 pub(crate) struct ArrangeInput {
@@ -376,7 +379,7 @@ fn report_cut(
                     100.0 * outside,
                     view.flat.kind.name()
                 );
-                context.report(Diagnostic::note("projection-cut", subject, message, hint));
+                context.report(Diagnostic::note(PROJECTION_CUT, subject, message, hint));
             }
         }
     }

@@ -47,6 +47,7 @@ use trueup_vision::stacks::Fuse;
 
 use self::align::component::{camera_groups, camera_prior};
 use self::align::{AlignInput, Geometry};
+pub use self::arrange::PROJECTION_CUT;
 use self::arrange::{ArrangeInput, Arrangement};
 use self::borders::{BordersInput, Unbordered};
 use self::budget::Budget;

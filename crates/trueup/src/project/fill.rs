@@ -21,7 +21,7 @@ use super::record::{
 use crate::options::{MethodForm, StitchOptions};
 use crate::pipeline::align::Geometry;
 use crate::pipeline::align::component::Component;
-use crate::pipeline::arrange::Arrangement;
+use crate::pipeline::arrange::{Arrangement, PROJECTION_CUT};
 use crate::pipeline::matched::Matched;
 use crate::pipeline::photographs::PhotographSet;
 
@@ -185,7 +185,7 @@ const FOUND_IN_COMPOSING: [&str; 12] = [
     "gaps-filled",
     "grid-folded",
     "photograph-replaced",
-    "projection-cut",
+    PROJECTION_CUT,
     "projection-left-out",
     "view-not-heeded",
 ];
