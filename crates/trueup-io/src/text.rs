@@ -31,6 +31,19 @@ pub fn read_to_string(path: &Path) -> Result<String> {
     String::from_utf8(read(path)?).map_err(|error| Error::new(ErrorKind::InvalidData, error.utf8_error()))
 }
 
+/// The text of a file that people named, in UTF-8; `hint` says what is to be named in its place if it is none.
+///
+/// # Errors
+/// [`trueup_core::Error::Io`] as [`read`]; [`trueup_core::Error::Input`] if it is not in UTF-8.
+pub fn read_named(path: &Path, hint: &str) -> trueup_core::Result<String> {
+    use trueup_core::Error;
+    let bytes = read(path).map_err(|error| Error::io("reading", path, error))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let reason = format!("it is no text in UTF-8 ({})", error.utf8_error());
+        Error::input(path.display(), reason, hint)
+    })
+}
+
 fn read_at_most(stream: impl Read, longest: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     // One more tells whether there are more.
@@ -65,5 +78,7 @@ mod tests {
         std::fs::write(&path, [0xff]).expect("written");
         assert_eq!(read(&path).expect("its bytes"), [0xff]);
         assert_eq!(read_to_string(&path).expect_err("no text").kind(), ErrorKind::InvalidData);
+        let refused = read_named(&path, "Give another.").expect_err("no text").to_string();
+        assert!(refused.contains("it is no text in UTF-8 (") && refused.ends_with("Give another."), "{refused}");
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use trueup_align::stitch_graph::{GraphFile, parse_graph_file};
-use trueup_core::{Error, Result};
+use trueup_core::Result;
 use trueup_io::source::{self, InMemory, RejectedSource};
 
 use super::masks::MaskFile;
@@ -55,13 +55,9 @@ impl Inputs {
     /// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is no text, or no graph of these photographs.
     pub(crate) fn graph_file(&self, photographs: &[&Path]) -> Result<GraphFile> {
         let Some(path) = &self.graph else { return Ok(GraphFile::default()) };
-        let file = path.display().to_string();
-        let bytes = trueup_io::text::read(path).map_err(|error| Error::io("reading", path, error))?;
-        let text = std::str::from_utf8(&bytes).map_err(|error| {
-            let reason = format!("it is no text in UTF-8 ({error})");
-            Error::input(&file, reason, "Save it as text in UTF-8, with one pair per line as NAME -- NAME.")
-        })?;
-        parse_graph_file(text, photographs, &file)
+        let hint = "Save it as text in UTF-8, with one pair per line as NAME -- NAME.";
+        let text = trueup_io::text::read_named(path, hint)?;
+        parse_graph_file(&text, photographs, &path.display().to_string())
     }
 
     /// The files that the photographs' names, folders and patterns stand for, in their order, whether or not they are

@@ -119,11 +119,8 @@ fn centered(lens: &PlacedLens) -> PlacedLens {
 /// [`Error::Io`] if the file cannot be read; [`Error::Input`] if it is no project, or knows no lens for any photograph.
 pub(crate) fn tell_lenses(path: &Path, images: &mut [SourceImage], context: &StageContext) -> Result<()> {
     let file = path.display().to_string();
-    let bytes = trueup_io::text::read(path).map_err(|error| Error::io("reading", path, error))?;
-    let text = String::from_utf8(bytes).map_err(|_| {
-        let hint = "Give a file that `trueup stitch --project` wrote, or a project of Hugin's (.pto).";
-        Error::input(&file, "it is no project, but no text at all", hint)
-    })?;
+    let hint = "Give a file that `trueup stitch --project` wrote, or a project of Hugin's (.pto).";
+    let text = trueup_io::text::read_named(path, hint)?;
     let known = match HuginProject::is_one(&text, path) {
         true => HuginProject::parse(&text, &file)?.lens_records().iter().filter_map(KnownLens::of).collect(),
         false => known_by(&Project::from_json(&text, &file)?, &file)?,

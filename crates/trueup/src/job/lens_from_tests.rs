@@ -70,5 +70,5 @@ fn a_photograph_in_place_of_a_project_is_refused_in_words() {
     let file = desk.path().join("photo.jpg");
     std::fs::write(&file, [0xff, 0xd8, 0xff]).expect("written");
     let message = tell_lenses(&file, &mut [], &StageContext::default()).expect_err("no project").to_string();
-    assert!(message.contains("photo.jpg: it is no project, but no text at all. Give a file that"), "{message}");
+    assert!(message.contains("photo.jpg: it is no text in UTF-8 ("), "{message}");
 }
