@@ -50,17 +50,19 @@ pub struct LocalDistortion {
 /// The paper does not say when a cell is outside; `outside` does.
 pub fn local_distortion(meshes: &[GridMesh], outside: Outside, period: Option<f64>) -> LocalDistortion {
     let outlines: Vec<Outline> = meshes.iter().map(Outline::new).collect();
+    // Photographs begin in one turn and end in the next at the latest.
+    let shifts = period.map_or(vec![0.0], |period| vec![-period, 0.0, period]);
+    let shifts: Vec<Vector2<f64>> = shifts.into_iter().map(|shift| Vector2::new(shift, 0.0)).collect();
     let mut folds = 0;
     let mut photographs = Vec::with_capacity(meshes.len());
     for (k, mesh) in meshes.iter().enumerate() {
-        let is_in = |other: usize, point: Vector2<f64>| match period {
-            None => outlines[other].contains(point),
-            // Photographs begin in one turn and end in the next at the latest.
-            Some(period) => {
-                [-1.0, 0.0, 1.0].iter().any(|turns| outlines[other].contains(point + Vector2::new(turns * period, 0.0)))
-            }
-        };
-        let alone = |point: Vector2<f64>| (0..meshes.len()).all(|other| other == k || !is_in(other, point));
+        let others = outlines.iter().enumerate().filter(|&(other, _)| other != k).map(|(_, outline)| outline);
+        // Of many photographs few reach this one at all.
+        let reaching: Vec<(&Outline, Vector2<f64>)> = others
+            .flat_map(|other| shifts.iter().map(move |&shift| (other, shift)))
+            .filter(|(other, shift)| other.may_hold(mesh.bounds(), *shift))
+            .collect();
+        let alone = |point: Vector2<f64>| !reaching.iter().any(|(other, shift)| other.contains(point + shift));
         let vertices_alone: Vec<bool> = match outside {
             Outside::CenterAndCorners => (0..mesh.len()).map(|vertex| alone(target(mesh, vertex))).collect(),
             Outside::Center => vec![true; mesh.len()],

@@ -89,6 +89,13 @@ impl Outline {
         ((share * self.strips.len() as f64) as usize).min(self.strips.len() - 1)
     }
 
+    /// Whether a point between `low` and `high` may lie inside once it is moved by `shift`: no point does if not.
+    pub(super) fn may_hold(&self, (low, high): (Vector2<f64>, Vector2<f64>), shift: Vector2<f64>) -> bool {
+        let meets =
+            |axis: usize| low[axis] + shift[axis] <= self.high[axis] && self.low[axis] <= high[axis] + shift[axis];
+        meets(0) && meets(1)
+    }
+
     /// Whether a point lies inside, by the even-odd rule.
     pub(super) fn contains(&self, point: Vector2<f64>) -> bool {
         let beyond = |axis: usize| !(self.low[axis]..=self.high[axis]).contains(&point[axis]);

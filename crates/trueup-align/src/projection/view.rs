@@ -230,8 +230,12 @@ fn fanned(photographs: &[PosedPhotograph], coverage: &SphereCoverage) -> f64 {
     };
     let mean_square = photographs.iter().map(aside).sum::<f64>() / photographs.len().max(1) as f64;
     let sine = coverage.forward.try_normalize(f64::MIN_POSITIVE).map_or(0.0, |forward| forward.y.abs());
+    let fan = smooth(mean_square.sqrt() * sine, FANNED);
+    if fan == 0.0 {
+        return 0.0;
+    }
     let height = Seen::of(photographs, &Matrix3::identity(), PI).height();
-    smooth(mean_square.sqrt() * sine, FANNED) * (1.0 - smooth(height, TOO_STEEP))
+    fan * (1.0 - smooth(height, TOO_STEEP))
 }
 
 /// By how much the viewer turns from the photographs' middle to face the nearest facade: wholly if all is still within
