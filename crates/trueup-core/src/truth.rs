@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
-use crate::geometry::matrix_from_rows;
+use crate::geometry::{is_rotation, matrix_from_rows};
 use crate::lens::{LensProjection, LensTerms, PlacedLens};
 use crate::{Error, Result};
 
@@ -194,13 +194,6 @@ impl Truth {
         }
         Ok(())
     }
-}
-
-/// Whether rows are orthonormal and right-handed, within what printing to six digits loses.
-fn is_rotation(matrix: &Matrix3<f64>) -> bool {
-    const TOLERANCE: f64 = 1e-4;
-    let error = matrix * matrix.transpose() - Matrix3::identity();
-    error.iter().all(|entry| entry.abs() < TOLERANCE) && matrix.determinant() > 0.0
 }
 
 #[cfg(test)]

@@ -18,6 +18,13 @@ pub fn matrix_from_rows(rows: &[[f64; 3]; 3]) -> Matrix3<f64> {
     Matrix3::from_fn(|row, column| rows[row][column])
 }
 
+/// Whether rows are orthonormal and right-handed, within what printing to six digits loses.
+pub fn is_rotation(matrix: &Matrix3<f64>) -> bool {
+    const TOLERANCE: f64 = 1e-4;
+    let error = matrix * matrix.transpose() - Matrix3::identity();
+    error.iter().all(|entry| entry.abs() < TOLERANCE) && matrix.determinant() > 0.0
+}
+
 /// The roll of a camera that sees "down" in direction `down` of its own frame: the clockwise turn, in radians, that stands
 /// its photograph upright. 0 straight up or down.
 pub fn roll_from_down(down: &Vector3<f64>) -> f64 {

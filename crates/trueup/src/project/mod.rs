@@ -1,5 +1,6 @@
 //! The record of a stitch: what it holds, how it is filled, read again, and what else is made from it.
 
+mod check;
 pub(crate) mod fill;
 pub(crate) mod hugin;
 pub(crate) mod paths;

@@ -476,7 +476,7 @@ impl Project {
     /// Reads a project file's text. `file` is its name, for messages.
     ///
     /// # Errors
-    /// [`trueup_core::Error::Input`] if it is no project, damaged, or of a later version.
+    /// [`trueup_core::Error::Input`] if it is no project, damaged, or of a later version, or if numbers in it cannot be.
     pub fn from_json(text: &str, file: &str) -> trueup_core::Result<Self> {
         let wrong = |reason: String| {
             trueup_core::Error::input(file, reason, "Give a file that `trueup stitch --project` wrote.")
@@ -506,6 +506,7 @@ impl Project {
         }
         let project: Self =
             serde_json::from_value(value).map_err(|error| wrong(format!("the project is damaged ({error})")))?;
+        project.check(file)?;
         Ok(project.brought_up_to_date())
     }
 

@@ -7,6 +7,9 @@ use trueup_core::{Error, Result};
 /// What may be done about a file that is none.
 const AS_SAVED: &str = "Give a project that Hugin saved, or `trueup stitch --pto` wrote.";
 
+/// The fields that are numbers, of those that are read.
+const NUMBERS: [&str; 17] = ["w", "h", "f", "v", "r", "p", "y", "a", "b", "c", "d", "e", "g", "t", "TrX", "TrY", "TrZ"];
+
 /// One line: what each of its fields says, by its name.
 #[derive(Debug, Clone, PartialEq)]
 struct Line<'a> {
@@ -135,7 +138,10 @@ impl<'a> Line<'a> {
                 crop = Some(numbers_of(stated).ok_or_else(|| format!("S{stated} is no crop"))?);
                 continue;
             }
-            // What is no number (lists of steps) is not among what is read here.
+            if let Some(field) = field_of_no_number(name).filter(|_| stated.is_empty()) {
+                return Err(format!("{field} is no finite number"));
+            }
+            // What else is no number (lists of steps) is not among what is read here.
             if let Ok(number) = stated.parse::<f64>() {
                 if !number.is_finite() {
                     return Err(format!("{name} is no finite number"));
@@ -143,10 +149,22 @@ impl<'a> Line<'a> {
                 numbers.insert(name.to_owned(), number);
             } else if stated.starts_with('=') {
                 return Err(format!("{name} is that of a photograph whose own is that of another"));
+            } else if NUMBERS.contains(&name) {
+                return Err(format!("{name}{stated} is no number"));
             }
         }
         Ok(Fields { line: self.number, numbers, name: file_name, crop })
     }
+}
+
+/// The field of what was read as a name of letters alone, where it ends as programs print what is no number or no finite one: `rnan`.
+fn field_of_no_number(letters: &str) -> Option<&str> {
+    let ends = ["nan", "infinity", "inf"].into_iter();
+    let field = |end: &str| {
+        let (field, rest) = letters.split_at_checked(letters.len().checked_sub(end.len())?)?;
+        (!field.is_empty() && rest.eq_ignore_ascii_case(end)).then_some(field)
+    };
+    ends.filter_map(field).next()
 }
 
 /// As many finite numbers, between commas.
@@ -185,6 +203,16 @@ mod tests {
         assert!(refused(&TWO.replace("v=0", "v=7")).contains("line 5: v=7 is that of no other photograph"));
         assert!(refused(&TWO.replace("v=0", "v=1")).contains("line 5: v is that of a photograph"));
         assert!(refused(&TWO.replace("v50.5", "v1e999")).contains("line 4: v is no finite number"));
+        for (angle, told) in [
+            ("rnan", "r is no finite number"),
+            ("rNaN", "r is no finite number"),
+            ("r-nan", "r is no finite number"),
+            ("rinf", "r is no finite number"),
+            ("r-nan(ind)", "r-nan(ind) is no number"),
+            ("r1,5", "r1,5 is no number"),
+        ] {
+            assert!(refused(&TWO.replace("r-1.5", angle)).contains(&format!("line 4: {told}")), "{angle}");
+        }
         assert!(refused(&TWO.replace("n\"b.jpg\"", "n\"b.jpg")).contains("line 5: the text of n does not end"));
         assert!(refused(&TWO.replace("S0,800,0,600", "S0,800,0")).contains("line 5: S0,800,0 is no crop"));
         assert!(refused(&TWO.replace("w800 h600 f0 v=0", "w800 600")).contains("line 5: a field without a name"));
