@@ -11,6 +11,7 @@ use crate::inspect;
 use crate::outcome;
 use crate::progress;
 use crate::report::ReportBeside;
+use crate::summary::Measured;
 
 pub(crate) fn run(args: ComposeArgs) -> Result<(), Failure> {
     let messages = args.messages.clone();
@@ -22,7 +23,7 @@ pub(crate) fn run(args: ComposeArgs) -> Result<(), Failure> {
         let written = [job.run(&options, context)?];
         report.write(&written, context).map(|()| written)
     })?;
-    outcome::tell(&written, &messages, takes_output)
+    outcome::tell(&written, &messages, takes_output, Measured::Stitched)
 }
 
 /// Arguments that make sense: what the library needs.

@@ -5,21 +5,27 @@ use trueup::Written;
 use crate::arguments::{FailOn, MessageArgs};
 use crate::failure::Failure;
 use crate::output;
-use crate::summary;
+use crate::summary::{self, Measured};
 use crate::words::printable;
 
-/// Says what was written, in the form asked for; `takes_output` tells that standard output holds a file.
+/// Says what was written, in the form asked for; `takes_output` tells that standard output holds a file,
+/// `measured` of which photographs the measures are.
 ///
 /// # Errors
 /// What [`MessageArgs::fail_on`] and [`MessageArgs::max_error`] make of it, and those of writing.
-pub(crate) fn tell(written: &[Written], messages: &MessageArgs, takes_output: bool) -> Result<(), Failure> {
+pub(crate) fn tell(
+    written: &[Written],
+    messages: &MessageArgs,
+    takes_output: bool,
+    measured: Measured,
+) -> Result<(), Failure> {
     if messages.quiet {
         trueup_terminal::complain(&printable(&summary::warnings(written)));
     }
     if messages.json {
         output::report(&summary::json(written), takes_output)?;
     } else if !messages.quiet {
-        output::report(&summary::of_written(written, messages.verbose), takes_output)?;
+        output::report(&summary::of_written(written, messages.verbose, measured), takes_output)?;
     }
     refuse(written, messages)
 }

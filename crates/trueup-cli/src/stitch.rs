@@ -8,6 +8,7 @@ use crate::failure::Failure;
 use crate::outcome;
 use crate::progress;
 use crate::report::ReportBeside;
+use crate::summary::Measured;
 
 pub(crate) fn run(args: StitchArgs) -> Result<(), Failure> {
     let messages = args.messages.clone();
@@ -17,7 +18,7 @@ pub(crate) fn run(args: StitchArgs) -> Result<(), Failure> {
         let written = job.run(&options, context)?;
         report.write(&written, context).map(|()| written)
     })?;
-    outcome::tell(&written, &messages, takes_output)
+    outcome::tell(&written, &messages, takes_output, Measured::Shown)
 }
 
 /// Arguments that make sense: what the library needs.

@@ -317,6 +317,7 @@ fn photographs_are_found_where_they_moved_and_others_shown_in_their_place() {
         desk.put(&format!("gray/{name}"), plain(480, 360, level));
     }
     let verbose = compose(&desk, &["--photos", "gray", "--verbose"]);
+    assert!(verbose.stdout.contains("measured    when stitched, not anew: upright"), "{}", verbose.stdout);
     assert!(verbose.expect_success().contains("b.jpeg: it is shown in place of b.jpg"), "{}", verbose.stdout);
     desk.put("gray/d.jpg", plain(481, 360, 93));
     std::fs::remove_file(desk.join("gray/a.jpg")).expect("removed");

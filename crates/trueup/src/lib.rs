@@ -52,7 +52,7 @@ pub use report::evaluation::{
     Evaluation, MatchEvaluation, PairMatchEvaluation, PhotographEvaluation, PixelEvaluation, StatedEvaluation,
     compare_overlaps, evaluate, evaluate_matches, evaluate_pixels, read_truth, scale_up_to,
 };
-pub use report::judgement::{Judgement, Verdict};
+pub use report::judgement::{Judgement, Verdict, is_of_measures};
 pub use report::measures::{
     BentLine, FEWEST_CERTAIN, LongLines, MeasuredLine, Measures, PairMeasures, PhotographMeasures, PlaceMeasures,
     ReprojectionMeasures, UprightMeasures, WorstPair, lean_side,

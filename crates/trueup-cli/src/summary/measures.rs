@@ -2,13 +2,18 @@
 
 use trueup::{FEWEST_CERTAIN, Judgement, Measures, PhotographMeasures, Project, lean_side};
 
+use super::Measured;
 use super::labeled_lines::LabeledLines;
 use super::names::{listed, name_of};
 
-/// One or two lines: how upright, how well aligned, how straight.
-pub(crate) fn short(lines: &mut LabeledLines, project: &Project, names: &[String]) {
+/// One or two lines: how upright, how well aligned, how straight, of photographs that were `measured` now or before.
+pub(crate) fn short(lines: &mut LabeledLines, project: &Project, names: &[String], measured: Measured) {
     let Some(measures) = &project.measures else { return };
-    lines.entry("measured", &upright(measures, project, names));
+    let when = match measured {
+        Measured::Shown => "",
+        Measured::Stitched => "when stitched, not anew: ",
+    };
+    lines.entry("measured", &format!("{when}{}", upright(measures, project, names)));
     let rest: Vec<String> = [alignment(measures), bent_line(measures, project, names)].into_iter().flatten().collect();
     if !rest.is_empty() {
         lines.entry("", &rest.join("; "));

@@ -15,7 +15,7 @@ use std::path::Path;
 
 use trueup::{
     Crop, FlatEvidence, FlatSceneRecord, LensKind, LineGuide, ORIENTATION_TAG_STALE, OptionValue, PROJECTION_CUT,
-    Project, Severity, Written,
+    Project, Severity, Written, is_of_measures,
 };
 
 use crate::words::file_size;
@@ -34,6 +34,16 @@ pub(crate) struct PanoramaFile<'a> {
     pub panorama: &'a Path,
     pub bytes: u64,
     pub project: Option<&'a Path>,
+    pub measured: Measured,
+}
+
+/// Of which photographs a panorama's measures are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Measured {
+    /// Of those that it shows.
+    Shown,
+    /// Of those that were stitched: composed of a project, it may show others in their place.
+    Stitched,
 }
 
 /// Stages faster than this, in seconds, are not named in the short list.
@@ -58,12 +68,13 @@ pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool
     if let Some(told) = project.manhattan.level_in_words() {
         lines.entry("level by", &told);
     }
-    measures::short(&mut lines, project, &names);
+    let measured = file.map_or(Measured::Shown, |file| file.measured);
+    measures::short(&mut lines, project, &names, measured);
     measures::judged(&mut lines, project);
     if verbose || file.is_none() {
         measures::table(&mut lines, project, &names);
     }
-    findings(&mut lines, project, verbose);
+    findings(&mut lines, project, verbose, measured);
     match verbose {
         true => details::seconds(&mut lines, &project.seconds),
         false => lines.entry("time", &seconds_in_short(&project.seconds)),
@@ -72,10 +83,10 @@ pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool
 }
 
 /// The summaries of panoramas that were written, with a blank line between them.
-pub(crate) fn of_written(written: &[Written], verbose: bool) -> String {
+pub(crate) fn of_written(written: &[Written], verbose: bool, measured: Measured) -> String {
     let one = |written: &Written| {
-        let file =
-            PanoramaFile { panorama: &written.outputs.panorama, bytes: written.bytes, project: written.project_file() };
+        let (panorama, project) = (&written.outputs.panorama, written.project_file());
+        let file = PanoramaFile { panorama, bytes: written.bytes, project, measured };
         text(&written.project, Some(&file), verbose)
     };
     written.iter().map(one).collect::<Vec<_>>().join("\n")
@@ -84,7 +95,7 @@ pub(crate) fn of_written(written: &[Written], verbose: bool) -> String {
 /// The measures that the project file holds, all of them.
 pub(crate) fn measures(lines: &mut LabeledLines, project: &Project) {
     let names = names(&project.images);
-    measures::short(lines, project, &names);
+    measures::short(lines, project, &names, Measured::Shown);
     measures::table(lines, project, &names);
 }
 
@@ -233,7 +244,8 @@ fn upright(project: &Project) -> String {
 
 /// Warnings, and with `verbose` notes, that are not told elsewhere; always, that another thing was drawn than the method means, or of other files
 /// than were named, that a photograph may lie on its side, where all is wanted what the view cuts off, and that a panorama is left with its ragged borders.
-fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool) {
+/// What was found of the figures of photographs that were `measured` before comes without advice, which is for who stitches them.
+fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool, measured: Measured) {
     /// The codes of these notes.
     const ALWAYS: [&str; 6] = [
         "crop-too-small",
@@ -257,8 +269,10 @@ fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool) {
         if is_detail || tells_of_left_out(diagnostic, project) {
             continue;
         }
-        lines.entry(label, &format!("{}: {}", diagnostic.subject.named(&names), diagnostic.message));
-        if !diagnostic.hint.is_empty() {
+        let is_earlier = measured == Measured::Stitched && is_of_measures(diagnostic);
+        let when = if is_earlier { "when stitched, " } else { "" };
+        lines.entry(label, &format!("{}: {when}{}", diagnostic.subject.named(&names), diagnostic.message));
+        if !diagnostic.hint.is_empty() && !is_earlier {
             lines.entry("", &diagnostic.hint);
         }
     }

@@ -30,7 +30,12 @@ fn project() -> Project {
 
 #[test]
 fn the_short_summary_says_what_was_made_of_what_and_why() {
-    let file = PanoramaFile { panorama: Path::new("p.jpg"), bytes: 4_200_000, project: Some(Path::new("p.json")) };
+    let file = PanoramaFile {
+        panorama: Path::new("p.jpg"),
+        bytes: 4_200_000,
+        project: Some(Path::new("p.json")),
+        measured: Measured::Shown,
+    };
     let expected = "\
 panorama    p.jpg  70 x 31 px, 4.2 MB
 project     p.json
@@ -122,7 +127,7 @@ fn measures_take_two_lines_and_uncertain_photographs_are_named() {
     let upright = serde_json::json!({"mean_deg": 0.31, "max_deg": 0.61, "within_deg": 0.7, "measured": 2});
     let project =
         measured(upright, serde_json::json!([photograph("x/a.jpg", 34, true), photograph("x/b.jpg", 5, false)]), bent);
-    let file = PanoramaFile { panorama: Path::new("p.jpg"), bytes: 1, project: None };
+    let file = PanoramaFile { panorama: Path::new("p.jpg"), bytes: 1, project: None, measured: Measured::Shown };
     let short = "\
 measured    upright within 0.7 degrees at 95 %, 0.3 expected on average (2 photographs measured, 1 uncertain: b.jpg)
             points meet within 0.4 px on average, 95 of 100 within 1.2; longest bent line: 412 px, 1.9 px off, in a.jpg
@@ -133,6 +138,24 @@ time ";
     let long = text(&project, None, false);
     assert!(long.contains("a.jpg: leans to the right by 0.61 +- 0.09 degrees at 95 % (34 vertical lines)"), "{long}");
     assert!(long.contains("b.jpg: uncertain: leans to the right by"), "{long}");
+}
+
+/// Who composes a project reads what was measured of the photographs that were stitched as just that, without advice to stitch them otherwise.
+#[test]
+fn figures_of_an_earlier_stitch_are_called_so() {
+    let mut project = measured(serde_json::Value::Null, serde_json::json!([]), serde_json::Value::Null);
+    let found =
+        trueup::Diagnostic::warning("misaligned", trueup::Subject::Pair(0, 1), "points lie apart", "Leave one out.");
+    project.diagnostics.push(found);
+    let told = |measured: Measured| {
+        let file = PanoramaFile { panorama: Path::new("p.jpg"), bytes: 1, project: None, measured };
+        text(&project, Some(&file), false)
+    };
+    let (own, earlier) = (told(Measured::Shown), told(Measured::Stitched));
+    assert!(own.contains("b.jpg: points lie apart\n            Leave one out.\n"), "{own}");
+    assert!(earlier.contains("measured    when stitched, not anew: upright"), "{earlier}");
+    assert!(earlier.contains("b.jpg: when stitched, points lie apart\n"), "{earlier}");
+    assert!(!earlier.contains("Leave one out"), "{earlier}");
 }
 
 #[test]

@@ -139,8 +139,8 @@ const LEANING: &str = "leaning";
 const MISALIGNED: &str = "misaligned";
 const BENT_LINE: &str = "line-bent";
 
-/// Whether a finding is one of [`warnings`], which other measures make obsolete.
-pub(crate) fn is_of_measures(finding: &Diagnostic) -> bool {
+/// Whether a finding is a warning about a figure that is to be looked at, which other measures make obsolete.
+pub fn is_of_measures(finding: &Diagnostic) -> bool {
     [LEANING, MISALIGNED, BENT_LINE].contains(&finding.code.as_str())
 }
 
