@@ -29,7 +29,7 @@ trueup_core::options! {
         subdivision: usize = 2, between(1.0, 16.0), "";
         /// Weight of the alignment of overlaps. Raise it where overlaps show double, lower it where aligning them bends
         /// the photographs.
-        alignment_weight: f64 = 1.0, between(0.0, 1000.0), "";
+        alignment_weight: f64 = 1.0, between(0.001, 1000.0), "";
         /// Weight of local similarity (on residuals). Raise it where small things are distorted.
         local_weight: f64 = 0.75, between(0.0, 1000.0), "";
         /// Weight of the similarity prior next to an overlap (on residuals, for 40 px cells). Raise it where
@@ -38,5 +38,19 @@ trueup_core::options! {
         /// Weight with which a refinement (`stitch.align`) keeps each photograph's outline where the plain mesh has it
         /// (on residuals). Lower it where the refinement cannot move a photograph's border far enough.
         outline_weight: f64 = 10.0, between(0.0, 1000.0), "";
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::options::StageOptions;
+
+    use super::*;
+
+    /// Without any weight, nothing holds photographs together, and their places are anything.
+    #[test]
+    fn overlaps_weigh_something() {
+        let weighed = |alignment_weight: f64| MeshOptions { alignment_weight, ..MeshOptions::default() }.invalid();
+        assert!(!weighed(0.0).is_empty() && weighed(0.001).is_empty());
     }
 }
