@@ -125,10 +125,10 @@ fn wrong_options_are_all_listed_with_what_is_allowed() {
 fn a_configuration_that_cannot_be_used_says_why() {
     let desk = Desk::new();
     for (text, reason) in [
-        ("[mesh\n", "c.toml: "),
-        ("[mash]\ncell_px = 3\n", "c.toml: there is no table \"mash\""),
-        ("[mesh]\ncell = 3\n", "c.toml: there is no option \"mesh.cell\""),
-        ("[mesh]\ncell_px = \"wide\"\n", "c.toml: "),
+        ("[mesh\n", "c.toml: line 1: "),
+        ("[mash]\ncell_px = 3\n", "c.toml: line 1: there is no table \"mash\""),
+        ("[mesh]\ncell = 3\n", "c.toml: line 2: there is no option \"mesh.cell\""),
+        ("[mesh]\ncell_px = \"wide\"\n", "c.toml: line 2: "),
         ("[mesh]\ncell_px = -3.0\n", "invalid mesh.cell_px = -3 (allowed: "),
     ] {
         desk.put("c.toml", text);

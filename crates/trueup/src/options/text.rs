@@ -23,29 +23,62 @@ impl StitchOptions {
     /// # Errors
     /// [`Error::Input`] for text that is not TOML, unknown stages or options, or values of the wrong type.
     pub fn merge_toml(&mut self, text: &str, file: &str) -> Result<()> {
-        let hint = "List stages, options and their ranges with `trueup options`.";
-        let not_toml = |error| Error::input(file, format!("it is no TOML ({})", first_line(&error)), hint);
+        let wrong = |line: Option<usize>, reason: String| {
+            let place = line.map_or(String::new(), |line| format!("line {line}: "));
+            Error::input(
+                file,
+                format!("{place}{reason}"),
+                "List stages, options and their ranges with `trueup options`.",
+            )
+        };
+        let not_toml = |error: toml::de::Error| {
+            let line = error.span().map(|place| line_at(text, place.start));
+            wrong(line, format!("it is no TOML ({})", first_line(&error)))
+        };
         let given: toml::Table = text.parse().map_err(not_toml)?;
         let mut merged = self.to_table()?;
         for (stage, values) in given {
             let toml::Value::Table(values) = values else {
-                return Err(Error::input(file, format!("\"{stage}\" must be a table, [{stage}]"), hint));
+                return Err(wrong(line_of(text, &[&stage]), format!("\"{stage}\" must be a table, [{stage}]")));
             };
             let mut known = merged.get_mut(&stage).and_then(toml::Value::as_table_mut);
             if known.is_none() && !values.keys().any(|option| Retired::of(&format!("{stage}.{option}")).is_some()) {
-                return Err(Error::input(file, format!("there is no table \"{stage}\""), hint));
+                return Err(wrong(line_of(text, &[&stage]), format!("there is no table \"{stage}\"")));
             }
             for (option, value) in values {
                 match known.as_mut().and_then(|known| known.get_mut(&option)) {
                     Some(present) => *present = value,
-                    None => return Err(Error::input(file, no_option(&format!("{stage}.{option}")), hint)),
+                    None => {
+                        let line = line_of(text, &[&stage, &option]);
+                        return Err(wrong(line, no_option(&format!("{stage}.{option}"))));
+                    }
                 }
             }
         }
-        // The last line of a wrong type's error names the option.
-        let wrong = |error: toml::de::Error| Error::input(file, error.to_string().trim_end().replace('\n', " "), hint);
-        *self = merged.try_into().map_err(wrong)?;
+        *self = merged.try_into().map_err(|error: toml::de::Error| {
+            // The last line of a wrong type's error names the option.
+            let reason = error.to_string().trim_end().replace('\n', " ");
+            wrong(self.line_of_wrong_type(text), reason)
+        })?;
         Ok(())
+    }
+
+    /// The line of the first option in a TOML text that cannot have its value there, where it is the only one that changes.
+    fn line_of_wrong_type(&self, text: &str) -> Option<usize> {
+        let (given, own): (toml::Table, _) = (text.parse().ok()?, self.to_table().ok()?);
+        let options = given.iter().filter_map(|(stage, values)| Some((stage, values.as_table()?)));
+        let options = options.flat_map(|(stage, values)| values.iter().map(move |option| (stage, option)));
+        let cannot_be = |stage: &str, option: &str, value: &toml::Value| {
+            let mut changed = own.clone();
+            if let Some(present) = changed.get_mut(stage).and_then(|stage| stage.get_mut(option)) {
+                *present = value.clone();
+            }
+            changed.try_into::<Self>().is_err()
+        };
+        let lines = options
+            .filter(|(stage, (option, value))| cannot_be(stage, option, value))
+            .filter_map(|(stage, (option, _))| line_of(text, &[stage, option]));
+        lines.min()
     }
 
     /// Sets one option from text, as in `table.option=value`.
@@ -168,6 +201,23 @@ fn in_words(value: &toml::Value) -> &'static str {
     }
 }
 
+/// The line of a TOML text that the key at the end of a path of keys stands on, counted from 1.
+fn line_of(text: &str, path: &[&str]) -> Option<usize> {
+    let parsed = toml::de::DeTable::parse(text).ok()?;
+    let (last, tables) = path.split_last()?;
+    let mut table = parsed.get_ref();
+    for key in tables {
+        table = table.get(*key)?.get_ref().as_table()?;
+    }
+    let (key, _) = table.get_key_value(*last)?;
+    Some(line_at(text, key.span().start))
+}
+
+/// The line that the byte at `offset` stands on, counted from 1.
+fn line_at(text: &str, offset: usize) -> usize {
+    1 + text.bytes().take(offset).filter(|&byte| byte == b'\n').count()
+}
+
 /// TOML's errors span lines with a photograph of the text; the reason is what users need.
 fn first_line(error: &toml::de::Error) -> String {
     error.message().lines().next().unwrap_or_default().to_owned()
@@ -212,9 +262,17 @@ mod tests {
             let message = options.set(assignment).expect_err("must fail").to_string();
             assert!(message.contains(reason), "{message}");
         }
-        assert!(options.merge_toml("[mesh]\ncell = 3", "c.toml").is_err());
-        assert!(options.merge_toml("[mash]\ncell_px = 3", "c.toml").is_err());
-        assert!(options.merge_toml("mesh", "c.toml").is_err());
+        for (text, told) in [
+            ("[mesh]\ncell = 3", "c.toml: line 2: there is no option \"mesh.cell\""),
+            ("# mine\n\n[mash]\ncell_px = 3", "c.toml: line 3: there is no table \"mash\""),
+            ("mesh.cell_px = 30\nmesh.cell = 3", "c.toml: line 2: there is no option \"mesh.cell\""),
+            ("\nmesh", "c.toml: line 2: it is no TOML ("),
+            ("\r\nmesh = 3", "c.toml: line 2: \"mesh\" must be a table, [mesh]"),
+            ("[random]\nseed = 9\n[mesh]\ncell_px = \"wide\"", "c.toml: line 4: "),
+        ] {
+            let message = options.merge_toml(text, "c.toml").expect_err("must fail").to_string();
+            assert!(message.starts_with(told), "{message}");
+        }
         let renamed = options.merge_toml("[cache]\nmax_bytes = 3", "c.toml").expect_err("renamed").to_string();
         assert!(renamed.contains("\"cache.max_bytes\" is now \"resources.cache_bytes\""), "{renamed}");
         assert_eq!(options, StitchOptions::default());
