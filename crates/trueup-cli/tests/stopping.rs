@@ -54,6 +54,23 @@ fn ctrl_c_leaves_nothing_behind() {
     assert_eq!(stopped_by(PLAIN, &["INT"]), (Some(130), SAID.to_owned()));
 }
 
+/// A limit of the size of files fails the write that exceeds it, and does not end the command with its file half written.
+#[test]
+fn a_file_that_may_not_grow_leaves_nothing_behind() {
+    let desk = Desk::new();
+    for (name, bytes) in PHOTOGRAPHS.iter().zip(crate::pictures::street()) {
+        desk.put(name, bytes);
+    }
+    let mut command = Command::new("sh");
+    let script = "ulimit -f 8; exec \"$@\"";
+    command.current_dir(desk.path()).args(["-c", script, "sh", env!("CARGO_BIN_EXE_trueup"), "stitch"]);
+    let output = command.args(PHOTOGRAPHS).args(["-o", "pano.png"]).output().expect("the command starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("pano.png") && said.contains("File too large"), "{said}");
+    assert_eq!(desk.files(), PHOTOGRAPHS);
+}
+
 /// Some programs send the request twice, such as `timeout`.
 #[test]
 fn a_request_to_terminate_leaves_nothing_behind() {

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use signal_hook::consts::{SIGHUP, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGTERM, SIGXFSZ};
 use signal_hook::iterator::Signals;
 
 use crate::request::StopRequest;
@@ -10,17 +10,18 @@ use crate::request::StopRequest;
 /// What shells add to a signal's number for the exit status of the program that it ended.
 const STATUS_OF_SIGNALS: i32 = 128;
 
-/// Has `request` made by SIGTERM, and by SIGHUP unless it is ignored.
+/// Has `request` made by SIGTERM, and by SIGHUP unless it is ignored. SIGXFSZ is caught as well and does nothing, so that a file that grows beyond
+/// the limit of its size (`ulimit -f`) fails the write with an error, which removes what was written of it, in place of ending the program.
 ///
 /// # Errors
 /// Those of the operating system.
 pub(crate) fn catch(request: StopRequest) -> io::Result<()> {
-    let mut signals = Signals::new([SIGTERM])?;
+    let mut signals = Signals::new([SIGTERM, SIGXFSZ])?;
     if heeds_hangup() {
         signals.add_signal(SIGHUP)?;
     }
     std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
-        for signal in signals.forever() {
+        for signal in signals.forever().filter(|&signal| signal != SIGXFSZ) {
             // Signals are few: the sum fits.
             request.made((STATUS_OF_SIGNALS + signal) as u8, false);
         }
