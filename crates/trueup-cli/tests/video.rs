@@ -109,6 +109,34 @@ fn a_damaged_video_is_left_out_as_a_damaged_photograph_is() {
     desk.stitch(&["bad.mp4"]).expect_failure(1, &["bad.mp4: it is a video, and ffmpeg cannot take its frames out"]);
 }
 
+/// A clip whose camera was turned upright on the way, as some telephones write it: its frames would be squeezed, and numbered twice.
+#[test]
+fn a_video_whose_frames_change_their_size_is_refused() {
+    let Some(desk) = clip() else { return };
+    let photographs = crate::pictures::street();
+    let upright = image::load_from_memory(&photographs[0]).expect("a photograph").rotate90();
+    upright.save(desk.join("upright.jpg")).expect("written");
+    let frames = [&photographs[0][..], &photographs[1], &desk.read("upright.jpg"), &desk.read("upright.jpg")].concat();
+    desk.put("frames.mjpeg", frames);
+    let mut ffmpeg = Command::new("ffmpeg");
+    ffmpeg.current_dir(desk.path()).args([
+        "-v",
+        "error",
+        "-f",
+        "mjpeg",
+        "-i",
+        "frames.mjpeg",
+        "-c",
+        "copy",
+        "turned.mkv",
+    ]);
+    assert!(ffmpeg.status().expect("ffmpeg runs").success(), "a clip is made");
+    let before = desk.files();
+    desk.stitch(&["turned.mkv"])
+        .expect_failure(1, &["turned.mkv: it is a video whose frames change their size or kind on the way"]);
+    assert_eq!(desk.files(), before, "nothing is left behind");
+}
+
 #[test]
 fn without_ffmpeg_a_video_says_what_is_missing() {
     let desk = Desk::new();

@@ -79,8 +79,13 @@ impl Running {
 
     /// The last line that it said, when it has ended.
     pub(crate) fn last_words(&mut self) -> Option<String> {
-        let said = self.said.take().and_then(|said| said.join().ok())?;
-        said.lines().map(str::trim).rfind(|line| !line.is_empty()).map(str::to_owned)
+        self.lines_said().pop()
+    }
+
+    /// What it said, when it has ended, without empty lines; nothing the second time.
+    pub(crate) fn lines_said(&mut self) -> Vec<String> {
+        let said = self.said.take().and_then(|said| said.join().ok()).unwrap_or_default();
+        said.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned).collect()
     }
 }
 

@@ -34,6 +34,24 @@ const RATE: &str = "25";
 /// What the numbers of frames are called in the filters.
 const RENUMBERED: &str = "setpts=N/25/TB";
 
+/// A second output, which tells on standard error of each time that the filters begin: once, unless frames of another size or kind follow. Frames
+/// would be numbered anew from there.
+const BEGINNINGS: [&str; 9] = [
+    "-map",
+    "0:v:0",
+    "-vf",
+    "select='eq(n\\,0)',scale=16:16,format=gray",
+    "-c:v",
+    "rawvideo",
+    "-f",
+    "framecrc",
+    "pipe:2",
+];
+
+/// How the lines of that output begin: those of its head, and those of frames.
+const HEAD: &str = "#";
+const BEGINNING: &str = "0,";
+
 /// Whether a file is a video, by its first bytes.
 pub fn is_video(path: &Path) -> bool {
     // Opening a named pipe would wait for its writer.
@@ -57,10 +75,12 @@ pub struct SmallFrame {
 /// Hands every frame of a video to `each`, in their order, made small.
 ///
 /// # Errors
-/// [`Error::Input`] if `ffmpeg` is not installed, or finds no frames, or there are more than 20,000; [`Error::Cancelled`].
+/// [`Error::Input`] if `ffmpeg` is not installed, or finds no frames, or there are more than 20,000, or they change their size;
+/// [`Error::Cancelled`].
 pub fn look_through(video: &Path, context: &StageContext, mut each: impl FnMut(&SmallFrame)) -> Result<()> {
     let filters = format!("{RENUMBERED},scale='min({SMALL_WIDTH},iw)':-2,format=gray");
-    let output = ["-f", "image2pipe", "-c:v", "pgm", "-"].map(OsString::from);
+    let output: Vec<OsString> =
+        ["-f", "image2pipe", "-c:v", "pgm", "-"].into_iter().chain(BEGINNINGS).map(OsString::from).collect();
     let mut running = start(video, &filters, &output, None)?;
     let mut pictures = BufReader::new(running.output.take().ok_or_else(|| failed(video, "it writes nothing"))?);
     context.progress().begin(STAGE, 0);
@@ -134,18 +154,27 @@ fn start(video: &Path, filters: &str, output: &[OsString], folder: Option<&Path>
 /// Waits for the end of `ffmpeg`, which is a good one if it had no complaint and there were frames.
 fn end(mut running: Running, video: &Path, frames: usize) -> Result<()> {
     let is_good = running.wait()?;
+    let (told, complaints): (Vec<String>, Vec<String>) =
+        running.lines_said().into_iter().partition(|line| line.starts_with(HEAD) || line.starts_with(BEGINNING));
+    if told.iter().filter(|line| line.starts_with(BEGINNING)).count() > 1 {
+        return Err(Error::input(
+            video.display(),
+            "it is a video whose frames change their size or kind on the way",
+            "Cut out a part where they are alike, for example with `ffmpeg -ss 10 -t 30 -i clip.mp4 part.mp4`.",
+        ));
+    }
     // A video that is cut off has a complaint at its end, and frames that are good.
     if frames > 0 && (is_good || running.output.is_none()) {
         return Ok(());
     }
-    let last = running.last_words();
+    let last = complaints.last();
     // It begins with the address of the file, which is named already.
     let why = |line: &str| {
         line.strip_prefix("file:")
             .and_then(|line| line.split_once(": "))
             .map_or(line.to_owned(), |(_, why)| why.to_owned())
     };
-    let reason = last.map(|line| why(&line));
+    let reason = last.map(|line| why(line));
     Err(failed(video, reason.as_deref().unwrap_or("it says nothing of why")))
 }
 
