@@ -25,9 +25,10 @@ impl Project {
             image.check().map_err(|fault| wrong(format!("images[{position}] ({}): {fault}", image.file_name())))?;
         }
         let count = self.images.len();
-        for (position, pair) in self.pairs.iter().enumerate() {
+        // Without any photographs, that is what is wrong.
+        for (position, pair) in self.pairs.iter().enumerate().filter(|_| count > 0) {
             if pair.a >= count || pair.b >= count {
-                let fault = format!("a and b are positions in images from 0 to {}", count.saturating_sub(1));
+                let fault = format!("a and b are positions in images from 0 to {}", count - 1);
                 return Err(wrong(format!("pairs[{position}]: {fault}, not {} and {}", pair.a, pair.b)));
             }
         }
