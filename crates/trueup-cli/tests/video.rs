@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Command;
 
-use crate::pictures::put_street;
+use crate::pictures::{noise, put_street};
 use crate::run::{Desk, finish, trueup};
 
 /// A clip that shows each photograph of the street for three frames; `None` where ffmpeg is not installed, as `.ci/run` sees to.
@@ -113,10 +113,7 @@ fn a_damaged_video_is_left_out_as_a_damaged_photograph_is() {
 #[test]
 fn a_video_whose_frames_change_their_size_is_refused() {
     let Some(desk) = clip() else { return };
-    let photographs = crate::pictures::street();
-    let upright = image::load_from_memory(&photographs[0]).expect("a photograph").rotate90();
-    upright.save(desk.join("upright.jpg")).expect("written");
-    let frames = [&photographs[0][..], &photographs[1], &desk.read("upright.jpg"), &desk.read("upright.jpg")].concat();
+    let frames = [noise(1, 480, 360), noise(2, 480, 360), noise(3, 360, 480), noise(4, 360, 480)].concat();
     desk.put("frames.mjpeg", frames);
     let mut ffmpeg = Command::new("ffmpeg");
     ffmpeg.current_dir(desk.path()).args([
