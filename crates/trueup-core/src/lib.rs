@@ -17,6 +17,7 @@
 
 pub mod called;
 pub mod camera;
+pub mod carrier;
 pub mod color;
 pub mod context;
 pub mod diagnostics;

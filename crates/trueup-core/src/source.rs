@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use crate::carrier::CarrierParts;
 use crate::color::{LightRange, TransferCurve};
 use crate::error::Result;
 use crate::inset::Inset;
@@ -84,6 +85,9 @@ pub struct SourceImage {
     /// transparent on decoding.
     #[serde(default)]
     pub outline: Option<Outline>,
+    /// Where it shows what carries the camera, in pixels of width and height: not looked at, and not shown where another photograph can be.
+    #[serde(default)]
+    pub carrier: Option<CarrierParts>,
     /// EXIF orientation (1 to 8) that is applied on decoding: 1 where the tag is absent or stale.
     pub orientation: u8,
     /// Focal length from metadata, if believable.
@@ -125,6 +129,7 @@ impl SourceImage {
             height,
             inset: Inset::default(),
             outline: None,
+            carrier: None,
             orientation: 1,
             focal_prior: None,
             camera_model: None,
@@ -146,7 +151,7 @@ impl SourceImage {
 
     /// The photograph that lies in this picture inside `inset`, with what is known of its lens; `None` if nothing is left of it.
     ///
-    /// Its outline is not known then. A stated focal length in terms of 35 mm film is taken to be that of the photograph, which was smaller on the film then; any other
+    /// Its outline and the carrier's parts are not known then. A stated focal length in terms of 35 mm film is taken to be that of the photograph, which was smaller on the film then; any other
     /// one has to do with pixels.
     pub fn inside(self, inset: Inset) -> Option<Self> {
         let [old_width, old_height] = [self.width, self.height];
@@ -164,7 +169,7 @@ impl SourceImage {
         let (outer, inner) = (self.inset.sides(), inset.sides());
         let inset = Inset::from_sides(std::array::from_fn(|side| outer[side].saturating_add(inner[side])));
         let (focal_prior, lens) = (self.focal_prior.map(of_photograph), self.lens.map(moved));
-        Some(Self { width, height, inset, outline: None, focal_prior, lens, ..self })
+        Some(Self { width, height, inset, outline: None, carrier: None, focal_prior, lens, ..self })
     }
 
     /// Whether the file says something of the camera that took it.

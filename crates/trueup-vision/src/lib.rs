@@ -5,6 +5,7 @@
 //! the first pixel at (0.5, 0.5).
 
 pub mod border;
+pub mod carrier;
 pub mod features;
 pub mod frames;
 mod gray;
@@ -13,4 +14,5 @@ pub mod lines;
 pub mod matching;
 pub mod padding;
 pub mod pairing;
+mod squares;
 pub mod stacks;

@@ -243,11 +243,13 @@ fn upright(project: &Project) -> String {
 }
 
 /// Warnings, and with `verbose` notes, that are not told elsewhere; always, that another thing was drawn than the method means, or of other files
-/// than were named, that a photograph may lie on its side, where all is wanted what the view cuts off, and that a panorama is left with its ragged borders.
+/// than were named, that a photograph may lie on its side, that what the camera is fixed to is not looked at, where all is wanted what the view cuts
+/// off, and that a panorama is left with its ragged borders.
 /// What was found of the figures of photographs that were `measured` before comes without advice, which is for who stitches them.
 fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool, measured: Measured) {
     /// The codes of these notes.
-    const ALWAYS: [&str; 6] = [
+    const ALWAYS: [&str; 7] = [
+        "carrier-left-out",
         "crop-too-small",
         "drawn-by-cameras",
         "frames-passed-over",

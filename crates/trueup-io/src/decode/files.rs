@@ -25,6 +25,8 @@ pub struct FilePhotographs {
     in_memory: InMemory,
     /// By index; those beyond the end have none.
     masks: Vec<Masks>,
+    /// Of each, what shows the camera's carrier.
+    carriers: Vec<Option<Arc<Mask>>>,
     colors: Option<PhotographColors>,
     /// The light that all are handed out in, where what is brighter than white is kept, and its curve.
     light: Option<(LightRange, TransferCurve)>,
@@ -77,15 +79,41 @@ impl Kept {
     }
 }
 
+/// The masks of what shows the camera's carrier, by photograph: those that are alike are one.
+fn carriers(sources: &[SourceImage]) -> Vec<Option<Arc<Mask>>> {
+    let mut carriers: Vec<Option<Arc<Mask>>> = Vec::with_capacity(sources.len());
+    let look = |source: &SourceImage| ([source.width, source.height], source.carrier.clone());
+    for source in sources {
+        let size = [source.width, source.height];
+        let last = carriers.last().zip(sources.get(carriers.len().wrapping_sub(1)));
+        let carrier = match last {
+            Some((known, last)) if look(last) == look(source) => known.clone(),
+            _ => source.carrier.as_ref().map(|parts| Arc::new(parts.mask(size))),
+        };
+        carriers.push(carrier);
+    }
+    carriers
+}
+
+/// What is marked in either of two masks.
+fn either(one: Option<Arc<Mask>>, other: Option<Arc<Mask>>) -> Option<Arc<Mask>> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(Arc::new(Arc::unwrap_or_clone(one).or(&other))),
+        (one, other) => one.or(other),
+    }
+}
+
 impl FilePhotographs {
     /// Over `sources`, keeping at most `cache_bytes` bytes of decoded pixels; 0 keeps none.
     pub fn new(sources: Vec<SourceImage>, cache_bytes: usize) -> Self {
         let bytes = sources.iter().map(|_| AtomicUsize::new(0)).collect();
         let kept = Mutex::new(Kept::nothing(sources.len(), cache_bytes));
+        let carriers = carriers(&sources);
         Self {
             sources,
             in_memory: InMemory::default(),
             masks: Vec::new(),
+            carriers,
             colors: None,
             light: None,
             fusion: None,
@@ -196,16 +224,19 @@ impl FilePhotographs {
         Ok(picture)
     }
 
-    /// What of photograph `index` is not to be looked at: the parts that its photographer ignores, and what lies beside its outline.
+    /// What the photographer wants of the parts of photograph `index`.
+    pub fn given_masks(&self, index: usize) -> Masks {
+        self.masks.get(index).cloned().unwrap_or_default()
+    }
+
+    /// What of photograph `index` is not to be looked at: the parts that its photographer ignores, those that show the camera's carrier, and what
+    /// lies beside its outline.
     pub fn not_looked_at(&self, index: usize) -> Option<Arc<Mask>> {
         let ignored = self.masks(index).ignored;
         let source = self.sources.get(index)?;
         let Some(outline) = &source.outline else { return ignored };
         let beside = outline.beside([source.width, source.height]);
-        Some(Arc::new(match ignored {
-            Some(ignored) => beside.or(&ignored),
-            None => beside,
-        }))
+        either(Some(Arc::new(beside)), ignored)
     }
 
     /// Forgets photograph `index` if it is kept: for those that will not be asked for again.
@@ -361,7 +392,8 @@ impl PhotographSource for FilePhotographs {
     }
 
     fn masks(&self, index: usize) -> Masks {
-        self.masks.get(index).cloned().unwrap_or_default()
+        let Masks { ignored, kept } = self.given_masks(index);
+        Masks { ignored: either(ignored, self.carriers.get(index).cloned().flatten()), kept }
     }
 
     fn bytes(&self, index: usize) -> Option<usize> {

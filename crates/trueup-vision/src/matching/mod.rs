@@ -44,7 +44,7 @@ pub use search::{Nearest, Neighbor, SearchKernel};
 pub use strangers::{Stranger, StrangerKind, StrangersInput, find_strangers};
 
 pub(crate) use overlap::PredictedOverlap;
-pub(crate) use search::squared_distances;
+pub(crate) use search::{squared_distance, squared_distances};
 
 use crate::features::{FeatureSource, Features, no_photograph};
 use pair::{PairInput, PhotographFeatures, match_pair};

@@ -7,11 +7,8 @@ use trueup_core::source::WorkingFrame;
 
 use super::putative::PutativeMatch;
 use crate::features::Features;
+use crate::squares::{STILL_PX, Square, featured, square};
 
-/// Largest distance of a match on writing from where the writing would have it, working pixels: what shines through moves its corners.
-const STILL_PX: f64 = 1.5;
-/// Side of the squares by which the room that features take up is measured, working pixels.
-const SQUARE_PX: f64 = 40.0;
 /// Largest part of a photograph's room with features that writing takes up. Of two photographs of one view all features stand still, all over it.
 const MOST_ROOM: f64 = 0.2;
 /// Frames whose sides differ by no more, relative, are of one size.
@@ -66,16 +63,11 @@ pub(super) fn without_written(
         return putative;
     }
     let of_writing = putative.iter().zip(&on_writing).filter(|(_, is_held)| **is_held);
-    let written: BTreeSet<[i64; 2]> = of_writing.map(|(one, _)| square(one.at.in_a)).collect();
-    let featured: BTreeSet<[i64; 2]> = a.points.iter().map(|point| square(point.position)).collect();
-    if written.len() as f64 > MOST_ROOM * featured.len() as f64 {
+    let written: BTreeSet<Square> = of_writing.map(|(one, _)| square(one.at.in_a)).collect();
+    if written.len() as f64 > MOST_ROOM * featured(&a.points).len() as f64 {
         return putative;
     }
     putative.into_iter().zip(on_writing).filter(|(_, is_held)| !is_held).map(|(one, _)| one).collect()
-}
-
-fn square(position: [f64; 2]) -> [i64; 2] {
-    position.map(|along| (along / SQUARE_PX).floor() as i64)
 }
 
 #[cfg(test)]

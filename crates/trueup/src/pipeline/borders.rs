@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use trueup_core::diagnostics::{Diagnostic, Reported, Subject, add_seconds};
 use trueup_core::inset::Inset;
 use trueup_core::outline::Outline;
-use trueup_core::source::{PhotographSource, SourceImage};
+use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 use trueup_vision::border::EvenBorder;
 use trueup_vision::padding::{CommonPadding, Padding, StraightSided};
@@ -77,7 +77,7 @@ pub(super) fn run(input: BordersInput, options: &StitchOptions, context: &StageC
     let (old, mut told) = found.split();
     let images = old.images.iter().zip(&beside).map(|(image, beside)| beside.inside(image)).collect();
     let masks =
-        beside.iter().enumerate().map(|(number, beside)| old.files.masks(number).inside(beside.inset)).collect();
+        beside.iter().enumerate().map(|(number, beside)| old.files.given_masks(number).inside(beside.inset)).collect();
     let photographs = FoundPhotographs {
         images,
         in_memory: old.files.in_memory_photographs().clone(),

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use trueup_align::stitch_graph::{GraphFile, StitchGraph};
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::matches::PairMatches;
-use trueup_core::source::{PhotographSource, WorkingFrame};
+use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::RejectedSource;
 use trueup_vision::features::{self, FeatureSource, Features};
@@ -264,7 +264,7 @@ impl Matched {
         };
         let nothing_seen: Vec<usize> = (0..names.len()).filter(|&index| self.shows_nothing(index)).collect();
         if !nothing_seen.is_empty() {
-            let is_masked = |index: usize| self.set.files.masks(index).ignored.is_some();
+            let is_masked = |index: usize| self.set.files.given_masks(index).ignored.is_some();
             let words = |&index: &usize| match is_masked(index) {
                 true => format!("the mask of {} ignores all of it that is not black", names[index]),
                 false => format!("all of {} is black or transparent", names[index]),

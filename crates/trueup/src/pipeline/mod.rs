@@ -1,6 +1,6 @@
 //! The order of the work, whole, and nowhere else:
 //!
-//! photographs -> [measure] -> [borders] -> [stacking] -> [matching] -> [align] -> [arrange] -> [compose] -> panorama
+//! photographs -> [measure] -> [borders] -> [stacking] -> [carrier] -> [matching] -> [align] -> [arrange] -> [compose] -> panorama
 //!
 //! A phase is a function of its input, its options and a context; what it told on the way comes beside its product.
 
@@ -8,6 +8,7 @@ pub(crate) mod align;
 pub(crate) mod arrange;
 mod borders;
 mod budget;
+mod carrier;
 pub(crate) mod compose;
 mod frames;
 pub(crate) mod light;
@@ -51,6 +52,7 @@ pub use self::arrange::PROJECTION_CUT;
 use self::arrange::{ArrangeInput, Arrangement};
 use self::borders::{BordersInput, Unbordered};
 use self::budget::Budget;
+use self::carrier::{CarrierInput, CarrierLeftOut};
 use self::compose::{ComposeInput, Composed, Destination, LightInput, SmallPhotograph};
 use self::matched::Matched;
 use self::matching::MatchInput;
@@ -169,6 +171,8 @@ impl<'a> Stitcher<'a> {
             let Unbordered { found, measurements } = borders::run(input, self.options, context)?;
             let input = StackingInput { found, measurements, graph_file, memo, shelf, keep_grays, keeps_light };
             let Stacked { set, measurements, graph_file } = stacking::run(input, self.options, context)?;
+            let CarrierLeftOut { set, measurements } =
+                carrier::run(CarrierInput { set, measurements, shelf }, self.options, context)?;
             let mut matched = Matched::unmatched(set, measurements, graph_file)?;
             let looked_at = matched.take_features();
             let cameras = &self.options.align.cameras;

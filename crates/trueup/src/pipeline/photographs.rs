@@ -133,7 +133,14 @@ impl PhotographSet {
         let color_space = self.files.colors().map(|colors| (colors.name(), colors.icc().map(<[u8]>::to_vec)));
         let color_space = (color_space, self.files.light());
         let content = |maker: KeyMaker, image: &SourceImage| -> Option<KeyMaker> {
-            let maker = maker.part(&(image.width, image.height, image.inset, image.orientation, &image.outline));
+            let maker = maker.part(&(
+                image.width,
+                image.height,
+                image.inset,
+                image.orientation,
+                &image.outline,
+                &image.carrier,
+            ));
             if let Some(photograph) = self.files.in_memory_photographs().of(image) {
                 return Some(maker.photograph(photograph));
             }

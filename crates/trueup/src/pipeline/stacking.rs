@@ -193,7 +193,7 @@ fn aligned_stacks(
             let count = known.len();
             let camera = *known.entry(camera).or_insert(count);
             // Marks and outlines are of one exposure's pixels.
-            let masks = set.files.masks(number);
+            let masks = set.files.given_masks(number);
             let is_marked = masks.ignored.is_some() || masks.kept.is_some() || set.images[number].outline.is_some();
             let thumbnail = measured.as_ref().ok().filter(|_| !is_marked).map(|measured| &measured.thumbnail);
             StackCandidate { thumbnail, camera, recorded_stops: set.images[number].exposure.stops }
@@ -309,7 +309,7 @@ fn stacked_set(
     }
     let kept: Vec<usize> = (0..images.len()).filter(|&number| numbering.stays(number)).collect();
     let masks = AllMasks {
-        masks: kept.iter().map(|&number| old.files.masks(number)).collect(),
+        masks: kept.iter().map(|&number| old.files.given_masks(number)).collect(),
         records: kept.iter().map(|&number| old.masks[number].clone()).collect(),
     };
     let in_memory = old.files.in_memory_photographs().clone();

@@ -333,7 +333,8 @@ pub(crate) fn as_recorded(image: SourceImage, record: &ImageRecord) -> Result<So
     let path = image.path.display().to_string();
     let is_same = [image.width, image.height] == [width, height];
     let inside = if is_same { image.inside(record.inset) } else { None };
-    let inside = inside.map(|image| SourceImage { outline: record.outline.clone(), ..image });
+    let inside =
+        inside.map(|image| SourceImage { outline: record.outline.clone(), carrier: record.carrier.clone(), ..image });
     inside.ok_or_else(|| Error::input(path, other_size, "Give back the photograph that was stitched."))
 }
 

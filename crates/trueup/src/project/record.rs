@@ -9,6 +9,7 @@ use trueup_align::mesh::CameraPlane;
 use trueup_align::similarity::LevelSource;
 use trueup_compose::exposure::{Correction, Response};
 use trueup_core::camera::Camera;
+use trueup_core::carrier::CarrierParts;
 use trueup_core::color::LightRange;
 use trueup_core::diagnostics::{Diagnostic, Severity};
 use trueup_core::geometry::matrix_from_rows;
@@ -89,6 +90,10 @@ pub struct ImageRecord {
     /// whole picture is the photograph.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outline: Option<Outline>,
+    /// Where it shows what carries the camera: rectangles `[left, top, right, bottom]` in its pixels, that are not looked at, nor shown where another
+    /// photograph can be. `None` where it shows nothing of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub carrier: Option<CarrierParts>,
     /// EXIF orientation (1 to 8) that was applied to the stored pixels; 0 in files of programs that did not record it.
     #[serde(default)]
     pub orientation: u8,

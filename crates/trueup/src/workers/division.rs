@@ -9,7 +9,7 @@ use trueup_core::diagnostics::Reported;
 use trueup_core::mask::Masks;
 use trueup_core::matches::PairMatches;
 use trueup_core::options::StageOptions;
-use trueup_core::source::{PhotographSource, SourceImage};
+use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 use trueup_vision::matching::{MatchingInput, MatchingOptions};
@@ -144,7 +144,7 @@ fn elsewhere(files: &FilePhotographs) -> Option<Vec<SourceImage>> {
         return None;
     }
     let is_only_here = |number: usize| {
-        let Masks { ignored, kept } = files.masks(number);
+        let Masks { ignored, kept } = files.given_masks(number);
         files.in_memory(number).is_some() || ignored.is_some() || kept.is_some()
     };
     let absolute = |image: &SourceImage| {

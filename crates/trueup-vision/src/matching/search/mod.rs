@@ -116,7 +116,7 @@ impl<'a> Nearest<'a> {
 
 /// The squared Euclidean distance of two descriptors.
 #[inline(always)] // Compiled with the vector instructions of whoever asks.
-fn squared_distance(a: &Descriptor, b: &Descriptor) -> u32 {
+pub(crate) fn squared_distance(a: &Descriptor, b: &Descriptor) -> u32 {
     // Products of 16-bit numbers summed to 32 bits: one instruction on most processors. At most 128 * 255^2.
     let difference = |(&a, &b): (&u8, &u8)| i32::from(i16::from(a).wrapping_sub(i16::from(b)));
     a.iter().zip(b).map(difference).fold(0_i32, |sum, d| sum.wrapping_add(d.wrapping_mul(d))) as u32

@@ -1,0 +1,226 @@
+//! The carrier phase: what photographs show of what carries the camera, a bonnet or the legs of a drone, is taken from what is known of them.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use trueup_core::carrier::CarrierParts;
+use trueup_core::diagnostics::{Diagnostic, Subject};
+use trueup_core::mask::Mask;
+use trueup_core::source::SourceImage;
+use trueup_core::{Result, StageContext};
+use trueup_vision::carrier;
+use trueup_vision::features::{FeatureSource, Features, no_photograph};
+
+use super::light::WantedLight;
+use super::measure::Measurements;
+use super::measured::Measured;
+use super::photographs::{FoundPhotographs, PhotographSet};
+use super::shelf::{Shelf, ShelvedFeatures};
+use crate::job::masks::{AllMasks, blacken, curves_outside, lines_outside, outside};
+use crate::memo::KeyMaker;
+use crate::options::StitchOptions;
+
+/// The code of what is told of it.
+const CARRIER_LEFT_OUT: &str = "carrier-left-out";
+
+/// The stage by which its time is told.
+const STAGE: &str = "matching";
+
+/// What the phase works on.
+pub(super) struct CarrierInput<'a> {
+    pub set: PhotographSet,
+    pub measurements: Measurements,
+    pub shelf: &'a Shelf<'a>,
+}
+
+/// Photographs of which the carrier is not looked at.
+pub(super) struct CarrierLeftOut {
+    pub set: PhotographSet,
+    pub measurements: Measurements,
+}
+
+/// Finds where photographs show the carrier, and forgets what was measured there; without one, everything stays as it was.
+///
+/// # Errors
+/// [`trueup_core::Error::Io`] if features cannot be read; [`trueup_core::Error::Limits`]; [`trueup_core::Error::Cancelled`].
+pub(super) fn run(input: CarrierInput, options: &StitchOptions, context: &StageContext) -> Result<CarrierLeftOut> {
+    let CarrierInput { set, mut measurements, shelf } = input;
+    let found = context.time(STAGE, || found(&set, &measurements.photographs, context))?;
+    if found.is_empty() {
+        return Ok(CarrierLeftOut { set, measurements });
+    }
+    let mut images = set.images.clone();
+    for (members, parts) in &found {
+        let [width, height] = [images[members[0]].width, images[members[0]].height];
+        let mask = parts.mask([width, height]);
+        for &number in members {
+            images[number].carrier = Some(parts.clone());
+            if let Ok(measured) = &mut measurements.photographs[number] {
+                forget(measured, &mask, shelf)?;
+            }
+            let key = measurements.keys[number].take();
+            measurements.keys[number] = key.map(|key| KeyMaker::new().key(&key).part(parts).finish());
+        }
+        context.report(note(members, parts, &set));
+    }
+    let photographs = FoundPhotographs {
+        in_memory: set.files.in_memory_photographs().clone(),
+        masks: AllMasks {
+            masks: (0..images.len()).map(|number| set.files.given_masks(number)).collect(),
+            records: set.masks,
+        },
+        images,
+        rejected: set.rejected,
+        light: WantedLight::Known(set.files.light()),
+    };
+    // What it says of the photographs' colors was told already.
+    let opened = context.gather(|context| PhotographSet::open(photographs, options, context))?.value;
+    Ok(CarrierLeftOut { set: PhotographSet { lens_from: set.lens_from, ..opened }, measurements })
+}
+
+/// The features of photographs as they were measured.
+#[derive(Debug)]
+struct OfMeasured<'a>(&'a [Result<Measured>]);
+
+impl OfMeasured<'_> {
+    fn shelved(&self, photograph: usize) -> Option<&ShelvedFeatures> {
+        self.0.get(photograph)?.as_ref().ok().map(|measured| &measured.features)
+    }
+}
+
+impl FeatureSource for OfMeasured<'_> {
+    fn photographs(&self) -> usize {
+        self.0.len()
+    }
+
+    fn features(&self, photograph: usize) -> Result<Cow<'_, Features>> {
+        self.shelved(photograph).ok_or_else(|| no_photograph(photograph))?.get()
+    }
+
+    fn has_features(&self, photograph: usize) -> bool {
+        self.shelved(photograph).is_some_and(ShelvedFeatures::has_descriptors)
+    }
+}
+
+/// The photographs of each size that show a carrier, and where they do, in pixels of these.
+fn found(
+    set: &PhotographSet,
+    photographs: &[Result<Measured>],
+    context: &StageContext,
+) -> Result<Vec<(Vec<usize>, CarrierParts)>> {
+    let mut of_size: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
+    for (number, image) in set.images.iter().enumerate().filter(|(number, _)| photographs[*number].is_ok()) {
+        of_size.entry([image.width, image.height]).or_default().push(number);
+    }
+    let features = OfMeasured(photographs);
+    let mut found = Vec::new();
+    for members in of_size.into_values() {
+        let Ok(first) = &photographs[members[0]] else { continue };
+        let frame = first.frame;
+        if let Some(parts) = carrier::find(&features, &members, &frame, context)? {
+            found.push((members, parts.scaled(1.0 / frame.working_from_full)));
+        }
+    }
+    Ok(found)
+}
+
+/// Forgets what was measured of the carrier, which `mask` marks in the photograph's pixels.
+fn forget(measured: &mut Measured, mask: &Mask, shelf: &Shelf) -> Result<()> {
+    let frame = &measured.frame;
+    let features = outside(measured.features.get()?.as_ref(), mask, frame);
+    let lines = lines_outside(std::mem::take(&mut measured.lines), mask, frame);
+    let curves = curves_outside(std::mem::take(&mut measured.curves), mask, frame);
+    blacken(&mut measured.thumbnail, mask, &measured.thumbnail_frame);
+    let was_held = matches!(measured.features, ShelvedFeatures::Held(_));
+    let features = ShelvedFeatures::Held(features);
+    measured.features = if was_held { features } else { features.put_on(shelf) };
+    (measured.lines, measured.curves) = (lines, curves);
+    Ok(())
+}
+
+fn note(members: &[usize], parts: &CarrierParts, set: &PhotographSet) -> Diagnostic {
+    let SourceImage { width, height, .. } = set.images[members[0]];
+    let percent = 100.0 * parts.share_of([width, height]);
+    Diagnostic::note(
+        CARRIER_LEFT_OUT,
+        Subject::stage("matching"),
+        format!(
+            "{} photographs show the same at one place, whatever they look at ({percent:.0} % of each): what the camera is fixed to is not \
+             looked at, nor shown where another photograph can be",
+            members.len()
+        ),
+        "A mask of each photograph (--mask) marks it more exactly.",
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::raster::Photograph;
+    use trueup_io::decode;
+    use trueup_io::source::{InMemory, SourceOptions, scan};
+
+    use super::*;
+    use crate::job::inputs::Inputs;
+    use crate::memo::PhotographCache;
+    use crate::pipeline::{Alignment, Stitcher};
+
+    /// Where the bonnet begins, as a share of a photograph's height.
+    const BONNET: f64 = 0.82;
+
+    /// Speckles of three pixels a side, the same in each photograph, over its lower part.
+    fn before_a_bonnet(photograph: Photograph) -> Photograph {
+        let Photograph::Eight(mut raster) = photograph else { panic!("8 bits") };
+        let (top, channels) = ((BONNET * raster.height() as f64) as usize, raster.channels());
+        for y in top..raster.height() {
+            for (x, pixel) in raster.row_mut(y).chunks_mut(channels).enumerate() {
+                let speckle = ((x / 3) as u32).wrapping_mul(0x9e37_79b9) ^ ((y / 3) as u32).wrapping_mul(0x85eb_ca6b);
+                pixel.fill((speckle.wrapping_mul(0xc2b2_ae35) >> 25) as u8 + 40);
+            }
+        }
+        Photograph::Eight(raster)
+    }
+
+    fn room(changed: impl Fn(Photograph) -> Photograph) -> Inputs {
+        let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
+        let scanned = scan(&[room.to_owned()], &SourceOptions::default(), &StageContext::default());
+        let files = scanned.expect("the room").photographs;
+        let mut in_memory = InMemory::default();
+        for file in &files {
+            in_memory.insert(&file.name, changed(decode::photograph(file).expect("decoded")));
+        }
+        Inputs { in_memory, ..Inputs::new(files.iter().map(|file| file.name.clone())) }
+    }
+
+    fn aligned(inputs: &Inputs, cache: Option<&PhotographCache>) -> Alignment {
+        let options = StitchOptions::default();
+        let context = StageContext::default();
+        let stitcher = Stitcher::new(&options, &context).with_cache(cache);
+        stitcher.align(inputs).expect("a panorama").alignments.remove(0)
+    }
+
+    #[test]
+    fn cameras_before_a_bonnet_are_those_without() {
+        let without = aligned(&room(|photograph| photograph), None);
+        assert!(without.project.images.iter().all(|image| image.carrier.is_none()));
+        let desk = tempfile::tempdir().expect("a folder");
+        let cache = PhotographCache::open(desk.path(), 1e9).expect("a cache");
+        let inputs = room(before_a_bonnet);
+        let with = aligned(&inputs, Some(&cache));
+        assert_eq!(with.project.used(), 5);
+        assert!(with.project.diagnostics.iter().any(|one| one.code == CARRIER_LEFT_OUT));
+        for (image, clean) in with.project.images.iter().zip(&without.project.images) {
+            let parts = image.carrier.as_ref().expect("of every photograph");
+            assert!(parts.share_of([image.width, image.height]) > 0.1);
+            // Squares of 40 working pixels, which may begin as much above it.
+            let highest = parts.rectangles().iter().map(|&[_, top, ..]| top).fold(f64::INFINITY, f64::min);
+            assert!(highest > (BONNET - 0.1) * image.height as f64, "{highest} of {}", image.height);
+            let turned = |rows: Option<[[f64; 3]; 3]>| rows.expect("a camera")[0];
+            let [x, clean_x] = [image, clean].map(|image| turned(image.rotation));
+            let cosine: f64 = x.iter().zip(clean_x).map(|(one, other)| one * other).sum();
+            assert!(cosine.min(1.0).acos().to_degrees() < 0.1, "{}", image.path);
+        }
+        let again = aligned(&inputs, Some(&cache));
+        assert_eq!(again.project.images, with.project.images);
+        assert_eq!(cache.uses().get("pair").map_or(0, |pairs| pairs.made), 10, "pairs are matched once");
+    }
+}
