@@ -30,11 +30,11 @@ const SAME_VIEW: f64 = 0.5;
 const FEWEST_PAIRS: usize = 3;
 /// Least share of the pairs that show features in a square in which some stand still there, for it to be the carrier's. Measured on 44 sets with a
 /// carrier drawn in, 85 without and 31 photographed ones: nearly all of its squares have more than 0.8, the scene's less than 0.2.
-const OFTEN_STILL: f64 = 0.6;
+const OFTEN_STILL: f64 = 0.75;
 /// The same beside a square of the carrier's: its edge, behind which the scene changes.
-const STILL_BESIDE: f64 = 0.25;
+const STILL_BESIDE: f64 = 0.4;
 /// Least share of the squares with features that is a carrier; less is [written](crate::matching), or met by chance.
-const LEAST_SHARE: f64 = 0.02;
+const LEAST_SHARE: f64 = 0.05;
 /// Squares from a photograph's border within which a carrier begins. What stands still farther inside is what a camera moves towards, or turns about.
 const FROM_BORDER: i64 = 2;
 
@@ -290,8 +290,8 @@ mod tests {
 
     #[test]
     fn edges_of_the_carrier_belong_to_it() {
-        // Of a row above the bonnet half stands still now and then: in photographs 0, 1 and 2 of five, which are 3 pairs of 10.
-        let seen = |number: i64| photograph(number, move |[_, row]| row >= 13 || (row == 12 && number < 3));
+        // A row above the bonnet stands still now and then: in photographs 0 to 3 of five, which are 6 pairs of 10.
+        let seen = |number: i64| photograph(number, move |[_, row]| row >= 13 || (row == 12 && number < 4));
         let photographs: Vec<Features> = (0..5).map(seen).collect();
         assert_eq!(found(&photographs), Some(squares_of(|[_, row]| row >= 12)));
     }
@@ -310,8 +310,8 @@ mod tests {
         assert_eq!(views(&[0, 1, 2], |[_, row]| row >= 5), None, "more than half stands still");
         // What a camera moves towards.
         assert_eq!(views(&[0, 1, 2, 3], |[column, row]| (8..12).contains(&column) && (6..9).contains(&row)), None);
-        // A corner by chance: 3 of 300 squares.
-        assert_eq!(views(&[0, 1, 2, 3], |[column, row]| row == 0 && column < 3), None);
+        // A corner by chance: 12 of 300 squares.
+        assert_eq!(views(&[0, 1, 2, 3], |[column, row]| row == 0 && column < 12), None);
         assert_eq!(found(&[Features::default(), Features::default(), Features::default()]), None);
     }
 

@@ -9,6 +9,7 @@
 //! aside (`contradictions`). Focal lengths that parallax leaves open are those that are expected, in part (`expected_focal`), and those through which lines lie at right angles (`directions`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
 //! (`flat_scene`, by `plane_adjustment`), and lines say how it is turned (`upright_plane`).
 
+mod believed;
 mod bundle;
 mod contradictions;
 mod directions;
@@ -44,8 +45,8 @@ use trueup_core::matches::PairMatches;
 use trueup_core::{Result, StageContext};
 
 use crate::stitch_graph::{GraphEdge, StitchGraph};
+use believed::{Belief, Believed};
 use bundle::Parameters;
-use contradictions::contradicting_pairs;
 use expected_focal::OpenFocal;
 use flat_scene::FlatInput;
 use intrinsics::InitialIntrinsics;
@@ -84,7 +85,8 @@ pub struct Cameras {
     pub per_picture_focal: bool,
     /// Root mean square residual of each pair in working pixels, in the order of the pairs given.
     pub pair_rms_px: Vec<f64>,
-    /// Pairs (positions in the list given) that contradict the others and take no further part.
+    /// Pairs (positions in the list given) that contradict the others and take no further part. Overlaps for sure that parallax keeps from agreeing are not
+    /// among them: the cameras are found without them, but they are drawn and measured like others.
     pub contradicting: Vec<usize>,
     /// The plane that the photographs show from places of their own, if the cameras did more than rotate.
     #[serde(default)]
@@ -152,27 +154,20 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
         let seen = Seen { pairs: &used, curves: &curves, lines };
         solve(priors, seen, anchor, options, context)
     };
-    let residuals_of = |cameras: &[Camera]| -> Vec<f64> {
-        let transfer = |from: usize, to: usize| CameraTransfer::Rotating(&cameras[from], &cameras[to]);
-        pairs.iter().map(|pair| observations::pair_rms(transfer, pair)).collect()
-    };
-    let mut active: Vec<usize> = (0..pairs.len()).collect();
-    let mut solution = solve_with(&active)?;
-    // A false overlap spoils the cameras as parallax does: with focal lengths that are expected it would show less.
-    let first_rms_px = residuals_of(&solution.by_matches);
-    let contradicting = contradicting_pairs(&solution.by_matches, pairs, &first_rms_px, options.max_pair_rms_px);
-    if !contradicting.is_empty() {
-        active.retain(|position| contradicting.binary_search(position).is_err());
-        solution = solve_with(&active)?;
-    }
-    let pair_rms_px = residuals_of(&solution.cameras);
+    let belief =
+        Belief { photographs: priors.len(), pairs, anchor, max_rms_px: options.max_pair_rms_px, solve: &solve_with };
+    let Believed { mut solution, contradicting, told_rms_px } = belief.best()?;
+    let pair_rms_px = belief.residuals(&solution.cameras);
     let flat_input = FlatInput { priors, pairs, rotating: &solution.by_matches, anchor };
     if let Some(flat_scene) = flat_scene::find(&flat_input, options, context)? {
         let cameras = Cameras::before_plane(flat_scene, pairs, options);
         report_contradicting(pairs, &cameras.contradicting, &cameras.pair_rms_px, context);
         return Ok(cameras);
     }
-    report_contradicting(pairs, &contradicting, &first_rms_px, context);
+    let (strained, contradicting): (Vec<usize>, Vec<usize>) =
+        contradicting.into_iter().partition(|&position| is_strained(&pairs[position], pair_rms_px[position], options));
+    report_contradicting(pairs, &contradicting, &told_rms_px, context);
+    report_strained(pairs, &strained, &pair_rms_px, context);
     turn_to(&mut solution.cameras, reference);
     if solution.focal_failed {
         context.report(Diagnostic::warning(
@@ -193,12 +188,58 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
     Ok(Cameras { cameras, per_picture_focal, pair_rms_px, contradicting, flat_scene: None })
 }
 
+/// How many times the agreeing matches that a pair needs show that it is an overlap, whatever it contradicts. Of photographed sets, false ones have 1.4 at most.
+const SURE_OVERLAP: f64 = 1.5;
+/// Largest residual of a sure overlap that parallax makes, in units of that from which on the cameras are found without it.
+const MOST_STRAINED: f64 = 3.0;
+
+/// Whether a pair that contradicts the others is an overlap all the same, which parallax keeps from agreeing with rotating cameras.
+fn is_strained(pair: &PairMatches, rms_px: f64, options: &CameraOptions) -> bool {
+    pair.agreeing as f64 >= SURE_OVERLAP * pair.needed as f64 && rms_px <= MOST_STRAINED * options.max_pair_rms_px
+}
+
+/// Names the overlaps that take no part in the cameras, with their residuals.
+fn report_strained(pairs: &[PairMatches], positions: &[usize], rms_px: &[f64], context: &StageContext) {
+    for &position in positions {
+        let pair = &pairs[position];
+        context.report(Diagnostic::note(
+            "pair-strained",
+            Subject::Pair(pair.a, pair.b),
+            format!(
+                "this overlap contradicts the others by {:.1} px, as things at several distances do; the cameras are found without it",
+                rms_px[position]
+            ),
+            "",
+        ));
+    }
+}
+
 /// Names the pairs that are set aside, with their residuals when they were.
 fn report_contradicting(pairs: &[PairMatches], positions: &[usize], rms_px: &[f64], context: &StageContext) {
     for &position in positions {
         context.report(contradicts(&pairs[position], rms_px[position]));
     }
+    let all: usize = pairs.iter().map(|pair| pair.agreeing).sum();
+    let against: usize = positions.iter().map(|&position| pairs[position].agreeing).sum();
+    let strongest = positions.iter().map(|&position| &pairs[position]).max_by_key(|pair| pair.agreeing);
+    if let Some(strongest) = strongest.filter(|_| against as f64 > MUCH_AGAINST * all as f64) {
+        let percent = 100.0 * against as f64 / all as f64;
+        context.report(Diagnostic::warning(
+            "overlaps-contradict",
+            Subject::Pair(strongest.a, strongest.b),
+            format!(
+                "{} of {} overlaps, this one above all, contradict the others and are not used: {percent:.0} % of what matches",
+                positions.len(),
+                pairs.len()
+            ),
+            "Things that are alike, or near, may be the reason. If what these show is wrong in the panorama, join the right ones in a --graph file.",
+        ));
+    }
 }
+
+/// Share of all agreeing matches in the pairs set aside beyond which a warning says so. Of cut sets whose cameras are right without anything that repeats it is
+/// 0.02 at most.
+const MUCH_AGAINST: f64 = 0.05;
 
 /// Says that a lens is taken for a pinhole because nothing tells.
 fn lens_uncertain(overlaps: usize, doubt_px: f64) -> Diagnostic {

@@ -8,6 +8,7 @@ use trueup_core::matches::{PairVerdict, PointMatch, PointMatches};
 use trueup_core::source::WorkingFrame;
 
 use super::bundle::BundleAdjustment;
+use super::contradictions::contradicting_pairs;
 use super::intrinsics::LensState;
 use super::lenses::LensSearch;
 use super::rotations::relative_rotation;
@@ -306,6 +307,45 @@ fn a_pair_that_contradicts_the_rest_is_set_aside() {
     assert_eq!(cameras.contradicting, [wrong]);
     assert!(worst_rotation_error(&truth, &cameras.cameras) < 0.1);
     assert!(wrap_angle(cameras.pair_rms_px[wrong]) != 0.0);
+}
+
+/// Windows of a facade, each like the next: what is seen 15 degrees on is seen again.
+#[test]
+fn false_overlaps_do_not_drive_out_stronger_true_ones() {
+    let truth: Vec<Camera> = (0..6).map(|k| camera(700.0, 15.0 * f64::from(k), 0.0, 0.0)).collect();
+    let mut pairs = matched(&truth, 0.3, 0.0);
+    let mut false_ones = Vec::new();
+    for (a, b) in [(0, 2), (1, 3), (2, 4), (3, 5)] {
+        let seen_again = camera(700.0, 15.0 * (b as f64 - 1.0), 0.0, 0.0);
+        let matches = matched(&[truth[a], seen_again], 0.3, 0.0).remove(0).inliers;
+        let position = pairs.iter().position(|pair| (pair.a, pair.b) == (a, b)).expect("overlap");
+        pairs[position] = joined(a, b, matches.iter().take(120).copied().collect());
+        false_ones.push(position);
+    }
+    let cameras = estimate(&pairs, None, &[0; 6]);
+    assert_eq!(cameras.contradicting, false_ones);
+    assert!(worst_rotation_error(&truth, &cameras.cameras) < 0.1);
+}
+
+#[test]
+fn an_overlap_that_parallax_strains_stays_one() {
+    let truth: Vec<Camera> = (0..4).map(|k| camera(700.0, 15.0 * f64::from(k), 0.0, 0.0)).collect();
+    let mut pairs = matched(&truth, 0.3, 0.0);
+    let strained = pairs.iter().position(|pair| (pair.a, pair.b) == (0, 2)).expect("overlap");
+    for one in pairs[strained].inliers.iter_mut() {
+        one.in_b[0] += 20.0;
+    }
+    let with_needed = |needed: usize| {
+        let mut pairs = pairs.clone();
+        pairs[strained].needed = needed;
+        estimate(&pairs, Some(700.0), &[0; 4])
+    };
+    let agreeing = pairs[strained].agreeing;
+    let cameras = with_needed(agreeing / 2);
+    assert!(cameras.contradicting.is_empty());
+    assert!((cameras.pair_rms_px[strained] - 20.0).abs() < 1.0, "{:?}", cameras.pair_rms_px);
+    assert!(worst_rotation_error(&truth, &cameras.cameras) < 0.1);
+    assert_eq!(with_needed(agreeing * 3 / 4).contradicting, [strained]);
 }
 
 #[test]
