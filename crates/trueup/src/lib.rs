@@ -59,6 +59,7 @@ pub use report::measures::{
 };
 pub use report::shown::ShownPhotographs;
 pub use trueup_align::cameras::{CameraOptions, FlatEvidence, LensKind, SceneModel};
+pub use trueup_align::mesh::DRAWN_BY_CAMERAS;
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::crop::Crop;

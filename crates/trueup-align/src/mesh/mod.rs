@@ -47,7 +47,7 @@ use trueup_core::{Error, Result, StageContext};
 use alignment::AlignmentEnergy;
 pub(crate) use base::tilt_from_level;
 pub use base::{BaseMap, bases, bases_on_drawing, bases_on_plane, tilts, turn_length};
-pub use by_cameras::{ByCamerasInput, drawn_by_cameras, unless_worse};
+pub use by_cameras::{ByCamerasInput, DRAWN_BY_CAMERAS, drawn_by_cameras, unless_worse};
 pub use camera_plane::CameraPlane;
 pub use closure::Closure;
 pub use coarsening::cell_px;

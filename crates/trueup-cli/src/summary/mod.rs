@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use trueup::{
-    Crop, FlatEvidence, FlatSceneRecord, LensKind, LineGuide, ORIENTATION_TAG_STALE, OptionValue, PROJECTION_CUT,
-    Project, Severity, Written, is_of_measures,
+    Crop, DRAWN_BY_CAMERAS, Diagnostic, FlatEvidence, FlatSceneRecord, LensKind, LineGuide, ORIENTATION_TAG_STALE,
+    OptionValue, PROJECTION_CUT, Project, Severity, Subject, Written, is_of_measures,
 };
 
 use crate::words::file_size;
@@ -251,7 +251,7 @@ fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool, measured
     const ALWAYS: [&str; 7] = [
         "carrier-left-out",
         "crop-too-small",
-        "drawn-by-cameras",
+        DRAWN_BY_CAMERAS,
         "frames-passed-over",
         "frames-taken",
         ORIENTATION_TAG_STALE,
@@ -260,24 +260,41 @@ fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool, measured
     // Who asks for all is to know what is missing all the same.
     let wants_all = project.options.arrange.canvas.crop == Crop::None;
     let names = project.photograph_names();
-    for diagnostic in &project.diagnostics {
+    let is_wanted = |diagnostic: &Diagnostic| {
+        let code = diagnostic.code.as_str();
+        let is_note = diagnostic.severity == Severity::Note;
+        verbose || !is_note || ALWAYS.contains(&code) || (wants_all && code == PROJECTION_CUT)
+    };
+    let mut told: Vec<&Diagnostic> =
+        project.diagnostics.iter().filter(|one| is_wanted(one) && !tells_of_left_out(one, project)).collect();
+    while let [diagnostic, others @ ..] = told.as_slice() {
+        let diagnostic = *diagnostic;
+        let is_same = |other: &Diagnostic| !verbose && is_told_alike(diagnostic, other);
+        let (mut alike, rest): (Vec<&Diagnostic>, Vec<&Diagnostic>) =
+            others.iter().copied().partition(|other| is_same(other));
+        alike.insert(0, diagnostic);
+        told = rest;
         let label = match diagnostic.severity {
             Severity::Warning => "warning",
             Severity::Note => "note",
         };
-        let code = diagnostic.code.as_str();
-        let is_wanted = verbose || ALWAYS.contains(&code) || (wants_all && code == PROJECTION_CUT);
-        let is_detail = diagnostic.severity == Severity::Note && !is_wanted;
-        if is_detail || tells_of_left_out(diagnostic, project) {
-            continue;
-        }
+        let subjects: Vec<String> = alike.iter().map(|one| one.subject.named(&names)).collect();
+        let subjects = listed(&subjects.iter().map(String::as_str).collect::<Vec<_>>());
         let is_earlier = measured == Measured::Stitched && is_of_measures(diagnostic);
         let when = if is_earlier { "when stitched, " } else { "" };
-        lines.entry(label, &format!("{}: {when}{}", diagnostic.subject.named(&names), diagnostic.message));
+        lines.entry(label, &format!("{subjects}: {when}{}", diagnostic.message));
         if !diagnostic.hint.is_empty() && !is_earlier {
             lines.entry("", &diagnostic.hint);
         }
     }
+}
+
+/// Whether two findings say the same of two photographs.
+fn is_told_alike(one: &Diagnostic, other: &Diagnostic) -> bool {
+    let of_photographs = [one, other].iter().all(|found| matches!(found.subject, Subject::Photograph(_)));
+    of_photographs
+        && (&one.code, one.severity, &one.message, &one.hint)
+            == (&other.code, other.severity, &other.message, &other.hint)
 }
 
 /// "3.2 s: features 1.1, matching 0.7": the longest first.

@@ -144,8 +144,7 @@ time ";
 #[test]
 fn figures_of_an_earlier_stitch_are_called_so() {
     let mut project = measured(serde_json::Value::Null, serde_json::json!([]), serde_json::Value::Null);
-    let found =
-        trueup::Diagnostic::warning("misaligned", trueup::Subject::Pair(0, 1), "points lie apart", "Leave one out.");
+    let found = Diagnostic::warning("misaligned", Subject::Pair(0, 1), "points lie apart", "Leave one out.");
     project.diagnostics.push(found);
     let told = |measured: Measured| {
         let file = PanoramaFile { panorama: Path::new("p.jpg"), bytes: 1, project: None, measured };
@@ -192,13 +191,14 @@ fn without_vertical_lines_the_summary_says_so() {
 #[test]
 fn notes_on_what_was_decided_for_the_user_are_told() {
     let mut project = project();
-    let note = |code: &str, message: &str| {
-        trueup::Diagnostic::note(code, trueup::Subject::Photograph(0), message, "Set something.")
-    };
-    project.diagnostics.push(note(ORIENTATION_TAG_STALE, "the tag was not applied"));
+    let note = |code: &str, message: &str| Diagnostic::note(code, Subject::Photograph(0), message, "Set something.");
+    let tag = note(ORIENTATION_TAG_STALE, "the tag was not applied");
+    // The same of another is told with it.
+    project.diagnostics.push(tag.clone());
+    project.diagnostics.push(Diagnostic { subject: Subject::Photograph(1), ..tag });
     project.diagnostics.push(note(PROJECTION_CUT, "12 % of it lies outside of the view"));
     let told = text(&project, None, false);
-    assert!(told.contains("note        a.jpg: the tag was not applied\n            Set something.\n"), "{told}");
+    assert!(told.contains("note        a.jpg, b.jpg: the tag was not applied\n            Set something.\n"), "{told}");
     assert!(!told.contains("outside of the view"), "{told}");
     project.options.arrange.canvas.crop = Crop::None;
     let told = text(&project, None, false);

@@ -62,7 +62,9 @@ pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageCon
         let strangers = if input.wished.is_empty() { strangers(input, &pairs) } else { Vec::new() };
         let is_stranger = |photograph| strangers.iter().any(|stranger| stranger.photograph == photograph);
         let known = || pairs.iter().filter(|pair| !is_stranger(pair.a) && !is_stranger(pair.b));
-        matching::report_near_duplicates(known(), context);
+        // A marked photograph is meant to stand for itself beside others of its view.
+        let unmarked = |pair: &&PairMatches| [pair.a, pair.b].iter().all(|&one| !input.marked[one]);
+        matching::report_near_duplicates(known().filter(unmarked), context);
         let graph = StitchGraph::new(input.features.photographs(), known());
         Ok(Matches { pairs, strangers, graph })
     })

@@ -3,8 +3,9 @@
 use std::fmt;
 
 use serde::Serialize;
+use trueup_align::mesh::DRAWN_BY_CAMERAS;
 use trueup_align::metrics::BENT_SHARE;
-use trueup_align::projection::{FlatKind, ProjectionOptions};
+use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 use trueup_core::diagnostics::{Diagnostic, Subject};
 
 use super::measures::{Measures, PhotographMeasures, lean_side};
@@ -129,9 +130,11 @@ fn widest_lean_deg(photograph: &PhotographMeasures, asked_roll: f64) -> Option<f
     Some((lean - asked_for).abs() + photograph.within_deg.unwrap_or(0.0))
 }
 
-/// Whether lines and pixels aligned the overlaps, as asked or, as was `told`, because of parallax: nothing more can be asked for.
+/// Whether lines and pixels aligned the overlaps, as asked or, as was `told`, because of parallax, or the cameras draw the photographs, of which these
+/// move little: nothing more can be asked for.
 fn asked_all_evidence(project: &Project, told: &[Diagnostic]) -> bool {
-    project.options.align.stitch.align == Evidence::LinesPhotometric || told.iter().any(|found| found.code == PARALLAX)
+    let settles = |found: &Diagnostic| [PARALLAX, DRAWN_BY_CAMERAS].contains(&found.code.as_str());
+    project.options.align.stitch.align == Evidence::LinesPhotometric || told.iter().any(settles)
 }
 
 /// Names of the warnings below.
@@ -169,6 +172,11 @@ fn leaning(project: &Project, measures: &Measures, place: &impl Fn(&str) -> Opti
     /// Decimals of degrees that are told.
     const DECIMALS: usize = 1;
     let side = lean_side(lean, DECIMALS);
+    let ways = match project.options.arrange.projection.kind {
+        // It has chosen already.
+        Projection::Auto => "turn it back with --roll",
+        _ => "try --projection auto, or --roll with it",
+    };
     Some(Diagnostic::warning(
         LEANING,
         Subject::Photograph(place(&photograph.path)?),
@@ -176,7 +184,7 @@ fn leaning(project: &Project, measures: &Measures, place: &impl Fn(&str) -> Opti
             "what is vertical there leans{side} by {:.DECIMALS$} degrees, up to {within:.DECIMALS$} at 95 %",
             lean.abs()
         ),
-        "Look at it there. If it does lean, try --projection auto, or --roll with it.",
+        format!("Look at it there. If it does lean, {ways}."),
     ))
 }
 
@@ -296,6 +304,13 @@ mod tests {
         assert!(found[0].message.contains("to the left by 3.5 degrees, up to 3.7"), "{}", found[0].message);
         assert!(found[1].message.ends_with("lie within 564.0 px of each other"), "{}", found[1].message);
         assert!(found[1].hint.contains("--align lines+photometric"), "{}", found[1].hint);
+        // The view is chosen already.
+        assert!(!found[0].hint.contains("--projection auto"), "{}", found[0].hint);
+        let note = |code: &str| Diagnostic::note(code, Subject::stage("mesh"), "", "");
+        for code in [PARALLAX, DRAWN_BY_CAMERAS] {
+            let found = warnings(&project(0.5, 282.0, 1.0), &[note(code)]);
+            assert!(found[0].hint.contains("--mask"), "{code}: {}", found[0].hint);
+        }
         // Of two photographs, none can be left out.
         assert!(!found[1].hint.contains("leave one out"), "{}", found[1].hint);
     }

@@ -24,6 +24,9 @@ use drawing::{Drawing, Seen};
 pub use input::ByCamerasInput;
 use judgement::{Evidence, Suspicion};
 
+/// The code of the finding that says that the cameras draw the photographs instead of the mesh.
+pub const DRAWN_BY_CAMERAS: &str = "drawn-by-cameras";
+
 /// The grids that the cameras draw, where the mesh is worse than these; `None` where it is not.
 ///
 /// `drawn-by-cameras` says what was drawn and why.
@@ -45,7 +48,7 @@ pub fn unless_worse(
         return Ok(None);
     }
     context.report(Diagnostic::note(
-        "drawn-by-cameras",
+        DRAWN_BY_CAMERAS,
         Subject::stage("mesh"),
         format!(
             "drawn by the cameras instead, with corrections of up to {:.1} px where matches ask for them: {}",
