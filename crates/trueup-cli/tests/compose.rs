@@ -364,7 +364,6 @@ fn projects_edited_to_nonsense_are_refused() {
             "images[0] (a.jpg): upright_rotation is no rotation",
         ),
         ("/images/0/status", json!("lost"), "the project is damaged"),
-        ("/images/0/status", json!("left_out"), "images[0] (a.jpg): status is \"left_out\", yet it has a grid"),
         ("/canvas/width", json!(0), "does not belong to the grids"),
         ("/canvas/height", json!(1_000_000_000_u64), "does not belong to the grids"),
         ("/canvas/width", json!(20), "does not belong to the grids"),

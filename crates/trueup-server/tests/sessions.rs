@@ -489,8 +489,6 @@ fn all_masks_of_a_project_are_kept() {
     for (field, value) in [
         ("path", json!("gone.jpg")),
         ("status", json!("left_out")),
-        ("mesh", Value::Null),
-        ("solved_mesh", Value::Null),
         ("masks", json!([{ "path": "gone.png", "kind": "use" }])),
     ] {
         gone[field] = value;
@@ -540,7 +538,6 @@ fn a_project_reads_only_what_is_here() {
         let mut gone = project["images"][0].clone();
         gone["path"] = json!("gone.jpg");
         gone["status"] = json!("left_out");
-        (gone["mesh"], gone["solved_mesh"]) = (Value::Null, Value::Null);
         gone["stack"] = exposures(&[&elsewhere]);
         gone["masks"] = json!([{ "path": elsewhere, "kind": "use" }]);
         project["images"].as_array_mut().expect("a list").push(gone);

@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use trueup_core::geometry::{is_rotation, matrix_from_rows};
 use trueup_core::{Error, Result};
 
-use super::record::{ImageRecord, ImageStatus, Project};
+use super::record::{ImageRecord, Project};
 
 /// Recorded factors on light: twenty stops to both sides, several more than a camera's darkest and brightest exposures of one scene
 /// lie apart.
@@ -39,11 +39,6 @@ impl Project {
 impl ImageRecord {
     /// What is wrong about it, if anything is.
     fn check(&self) -> std::result::Result<(), String> {
-        if self.status == ImageStatus::LeftOut && (self.mesh.is_some() || self.solved_mesh.is_some()) {
-            return Err(
-                "status is \"left_out\", yet it has a grid: without mesh and solved_mesh it is left out".to_owned()
-            );
-        }
         for (field, rows) in [("rotation", &self.rotation), ("upright_rotation", &self.upright_rotation)] {
             if rows.as_ref().is_some_and(|rows| !is_rotation(&matrix_from_rows(rows))) {
                 return Err(format!("{field} is no rotation: three rows of length 1 at right angles, right-handed"));
@@ -93,8 +88,14 @@ mod tests {
         });
         let read = |project: &Value| Project::from_json(&project.to_string(), "p.json");
         assert!(read(&project).is_ok());
+        // Who says that a photograph is left out leaves it out.
+        let mut left_out = project.clone();
+        let grid = json!({"rows": 2, "cols": 2, "source": [[0.0, 0.0], [8.0, 0.0], [0.0, 6.0], [8.0, 6.0]],
+            "target": [[0.0, 0.0], [8.0, 0.0], [0.0, 6.0], [8.0, 6.0]]});
+        (left_out["images"][2]["mesh"], left_out["images"][1]["mesh"]) = (grid.clone(), grid);
+        let images = read(&left_out).expect("a project").images;
+        assert_eq!([1, 2].map(|number| images[number].mesh.is_some()), [true, false]);
         let mirrored = json!([[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-        let grid = json!({"rows": 2, "cols": 2, "source": [], "target": []});
         for (pointer, value, told) in [
             (
                 "/images/1/upright_rotation",
@@ -105,7 +106,6 @@ mod tests {
             ("/images/0/gain", json!(1e30), "images[0] (a.jpg): gain is 1000000000000000000000000000000, allowed are"),
             ("/images/0/gain", json!(-1.0), "images[0] (a.jpg): gain is -1, allowed are 0.000001 to 1000000"),
             ("/images/1/correction/gain/2", json!(0.0), "images[1] (b.jpg): correction.gain is 0, allowed are"),
-            ("/images/2/mesh", grid, "images[2] (c.jpg): status is \"left_out\", yet it has a grid"),
             ("/pairs/0/b", json!(7), "pairs[0]: a and b are positions in images from 0 to 2, not 0 and 7"),
         ] {
             let mut edited = project.clone();

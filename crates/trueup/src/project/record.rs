@@ -512,7 +512,15 @@ impl Project {
         let project: Self =
             serde_json::from_value(value).map_err(|error| wrong(format!("the project is damaged ({error})")))?;
         project.check(file)?;
-        Ok(project.brought_up_to_date())
+        Ok(project.brought_up_to_date().without_grids_of_left_out())
+    }
+
+    /// What draws photographs looks at their grids: one that somebody has marked as left out has none.
+    fn without_grids_of_left_out(mut self) -> Self {
+        for image in self.images.iter_mut().filter(|image| image.status == ImageStatus::LeftOut) {
+            (image.mesh, image.solved_mesh) = (None, None);
+        }
+        self
     }
 
     /// Version 1 recorded grids as they were solved, whatever the panorama was drawn on.
