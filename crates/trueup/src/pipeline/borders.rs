@@ -11,12 +11,10 @@ use trueup_core::{Result, StageContext};
 use trueup_vision::border::EvenBorder;
 use trueup_vision::padding::{CommonPadding, Padding, StraightSided};
 
-use super::light::WantedLight;
 use super::measure::{self, MeasureInput, Measurements};
 use super::measured::Measured;
-use super::photographs::{FoundPhotographs, PhotographSet};
+use super::photographs::PhotographSet;
 use super::shelf::Shelf;
-use crate::job::masks::AllMasks;
 use crate::memo::Memo;
 use crate::options::StitchOptions;
 
@@ -74,20 +72,15 @@ pub(super) fn run(input: BordersInput, options: &StitchOptions, context: &StageC
     if cut.is_empty() {
         return Ok(Unbordered { found, measurements });
     }
-    let (old, mut told) = found.split();
-    let images = old.images.iter().zip(&beside).map(|(image, beside)| beside.inside(image)).collect();
-    let masks =
-        beside.iter().enumerate().map(|(number, beside)| old.files.given_masks(number).inside(beside.inset)).collect();
-    let photographs = FoundPhotographs {
-        images,
-        in_memory: old.files.in_memory_photographs().clone(),
-        rejected: old.rejected,
-        masks: AllMasks { masks, records: old.masks },
-        light: WantedLight::Known(old.files.light()),
-    };
-    // What it says of the photographs' colors was told already.
-    let set = context.gather(|context| PhotographSet::open(photographs, options, context))?.value;
-    let set = PhotographSet { lens_from: old.lens_from, ..set };
+    let (set, mut told) = found.split();
+    let mut photographs = set.into_found();
+    for (image, beside) in photographs.images.iter_mut().zip(&beside) {
+        *image = beside.inside(image);
+    }
+    for (masks, beside) in photographs.masks.masks.iter_mut().zip(&beside) {
+        *masks = std::mem::take(masks).inside(beside.inset);
+    }
+    let set = PhotographSet::reopened(photographs, options, context)?;
     let input = MeasureInput { set: &set, memo, shelf, keep_grays, workers: None };
     let (again, told_again) = measure::some(&input, &cut, &options.measure, context)?.split();
     // What was told of features and lines was of those with the border's.

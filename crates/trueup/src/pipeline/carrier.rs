@@ -11,12 +11,11 @@ use trueup_core::{Result, StageContext};
 use trueup_vision::carrier;
 use trueup_vision::features::{FeatureSource, Features, no_photograph};
 
-use super::light::WantedLight;
 use super::measure::Measurements;
 use super::measured::Measured;
-use super::photographs::{FoundPhotographs, PhotographSet};
+use super::photographs::PhotographSet;
 use super::shelf::{Shelf, ShelvedFeatures};
-use crate::job::masks::{AllMasks, blacken, curves_outside, lines_outside, outside};
+use crate::job::masks::{blacken, curves_outside, lines_outside, outside};
 use crate::memo::KeyMaker;
 use crate::options::StitchOptions;
 
@@ -49,7 +48,8 @@ pub(super) fn run(input: CarrierInput, options: &StitchOptions, context: &StageC
     if found.is_empty() {
         return Ok(CarrierLeftOut { set, measurements });
     }
-    let mut images = set.images.clone();
+    let mut photographs = set.into_found();
+    let images = &mut photographs.images;
     for (members, parts) in &found {
         let [width, height] = [images[members[0]].width, images[members[0]].height];
         let mask = parts.mask([width, height]);
@@ -61,21 +61,9 @@ pub(super) fn run(input: CarrierInput, options: &StitchOptions, context: &StageC
             let key = measurements.keys[number].take();
             measurements.keys[number] = key.map(|key| KeyMaker::new().key(&key).part(parts).finish());
         }
-        context.report(note(members, parts, &set));
+        context.report(note(members, parts, images));
     }
-    let photographs = FoundPhotographs {
-        in_memory: set.files.in_memory_photographs().clone(),
-        masks: AllMasks {
-            masks: (0..images.len()).map(|number| set.files.given_masks(number)).collect(),
-            records: set.masks,
-        },
-        images,
-        rejected: set.rejected,
-        light: WantedLight::Known(set.files.light()),
-    };
-    // What it says of the photographs' colors was told already.
-    let opened = context.gather(|context| PhotographSet::open(photographs, options, context))?.value;
-    Ok(CarrierLeftOut { set: PhotographSet { lens_from: set.lens_from, ..opened }, measurements })
+    Ok(CarrierLeftOut { set: PhotographSet::reopened(photographs, options, context)?, measurements })
 }
 
 /// The features of photographs as they were measured.
@@ -138,8 +126,8 @@ fn forget(measured: &mut Measured, mask: &Mask, shelf: &Shelf) -> Result<()> {
     Ok(())
 }
 
-fn note(members: &[usize], parts: &CarrierParts, set: &PhotographSet) -> Diagnostic {
-    let SourceImage { width, height, .. } = set.images[members[0]];
+fn note(members: &[usize], parts: &CarrierParts, images: &[SourceImage]) -> Diagnostic {
+    let SourceImage { width, height, .. } = images[members[0]];
     let percent = 100.0 * parts.share_of([width, height]);
     Diagnostic::note(
         CARRIER_LEFT_OUT,

@@ -38,6 +38,8 @@ pub(crate) struct FoundPhotographs {
     pub masks: AllMasks,
     /// In which light they are handed out.
     pub light: WantedLight,
+    /// The project that told the lenses of some.
+    pub lens_from: Option<PathBuf>,
 }
 
 /// The photographs to be stitched. They are numbered by their place in `images`.
@@ -87,8 +89,9 @@ impl PhotographSet {
         }
         let masks = AllMasks::read(&inputs.masks, &inputs.in_memory, &images, accepted, context)?;
         let light = WantedLight::Surveyed;
-        let found = FoundPhotographs { images, in_memory: inputs.in_memory.clone(), rejected, masks, light };
-        Ok(Self { lens_from: inputs.lens_from.clone(), ..Self::open(found, options, context)? })
+        let (in_memory, lens_from) = (inputs.in_memory.clone(), inputs.lens_from.clone());
+        let found = FoundPhotographs { images, in_memory, rejected, masks, light, lens_from };
+        Self::open(found, options, context)
     }
 
     /// Photographs that are found already.
@@ -96,7 +99,8 @@ impl PhotographSet {
     /// # Errors
     /// [`Error::Limits`] if one is too large for the memory; [`Error::Cancelled`].
     pub(crate) fn open(found: FoundPhotographs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
-        let FoundPhotographs { images, in_memory, rejected, masks: AllMasks { masks, records }, light } = found;
+        let FoundPhotographs { images, in_memory, rejected, masks: AllMasks { masks, records }, light, lens_from } =
+            found;
         let over = |images: &[SourceImage], cache_bytes: usize| {
             let files = FilePhotographs::new(images.to_vec(), cache_bytes);
             files.with_in_memory(in_memory.clone()).fused_by(Arc::new(ExposureFusion))
@@ -111,7 +115,29 @@ impl PhotographSet {
         };
         let images = light::handed_out_in(images, light);
         let files = handed_out(over(&images, measuring.kept_bytes), &images, light, context).with_masks(masks);
-        Ok(Self { images, rejected, masks: records, lens_from: None, files: Arc::new(files), measuring })
+        Ok(Self { images, rejected, masks: records, lens_from, files: Arc::new(files), measuring })
+    }
+
+    /// What a set was opened from, in the light that it turned out to have: to be changed, and [opened again](Self::reopened).
+    pub(crate) fn into_found(self) -> FoundPhotographs {
+        let Self { images, rejected, masks: records, lens_from, files, .. } = self;
+        FoundPhotographs {
+            masks: AllMasks { masks: (0..images.len()).map(|number| files.given_masks(number)).collect(), records },
+            images,
+            in_memory: files.in_memory_photographs().clone(),
+            rejected,
+            light: WantedLight::Known(files.light()),
+            lens_from,
+        }
+    }
+
+    /// Photographs of a set that was open before, of which something has changed.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub(crate) fn reopened(found: FoundPhotographs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
+        // What it says of the photographs' colors was told already.
+        Ok(context.gather(|context| Self::open(found, options, context))?.value)
     }
 
     /// The names by which people know the photographs.

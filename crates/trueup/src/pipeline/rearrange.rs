@@ -56,13 +56,8 @@ impl Alignment {
         let records = self.project.used_images().map(|image| image.masks.clone()).collect();
         let in_memory = self.photographs.in_memory_photographs().clone();
         let masks = AllMasks { masks, records };
-        FoundPhotographs {
-            images,
-            in_memory,
-            rejected: Vec::new(),
-            masks,
-            light: WantedLight::Known(self.photographs.light()),
-        }
+        let light = WantedLight::Known(self.photographs.light());
+        FoundPhotographs { images, in_memory, masks, light, ..FoundPhotographs::default() }
     }
 }
 

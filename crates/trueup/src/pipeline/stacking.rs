@@ -110,14 +110,8 @@ pub(super) fn run(input: StackingInput, options: &StitchOptions, context: &Stage
     let anew: Vec<usize> = if is_new_light { (0..set.images.len()).collect() } else { fused };
     let measured = context.absorb(measure::some(&input, &anew, &options.measure, context)?);
     let Measurements { photographs, keys } = old_measurements;
-    let mut new = Measurements::default();
-    for (number, (one, key)) in
-        photographs.into_iter().zip(keys).enumerate().filter(|(number, _)| numbering.stays(*number))
-    {
-        debug_assert_eq!(numbering.new_of(number), new.photographs.len());
-        new.photographs.push(one);
-        new.keys.push(key);
-    }
+    let mut new =
+        Measurements { photographs: numbering.those_that_stay(photographs), keys: numbering.those_that_stay(keys) };
     for (number, (one, key)) in anew.into_iter().zip(measured.photographs.into_iter().zip(measured.keys)) {
         new.photographs[number] = one;
         new.keys[number] = key;
@@ -128,6 +122,7 @@ pub(super) fn run(input: StackingInput, options: &StitchOptions, context: &Stage
 /// Which number the photographs get when those of a stack have one.
 struct Numbering {
     new: Vec<usize>,
+    /// Whether a photograph has a number of its own.
     stays: Vec<bool>,
     is_of_a_stack: Vec<bool>,
 }
@@ -153,9 +148,9 @@ impl Numbering {
         self.new.get(number).copied().unwrap_or(number)
     }
 
-    /// Whether a photograph has a number of its own.
-    fn stays(&self, number: usize) -> bool {
-        self.stays[number]
+    /// Of what is known of each photograph, that of those that have a number of their own, by these.
+    fn those_that_stay<T>(&self, all: Vec<T>) -> Vec<T> {
+        all.into_iter().zip(&self.stays).filter(|(_, stays)| **stays).map(|(one, _)| one).collect()
     }
 
     fn is_of_a_stack(&self, number: usize) -> bool {
@@ -298,28 +293,26 @@ fn stacked_set(
     options: &StitchOptions,
     context: &StageContext,
 ) -> Result<(PhotographSet, Vec<usize>)> {
-    let mut images = old.images.clone();
-    let mut rejected = old.rejected.clone();
+    let mut found = old.into_found();
+    let FoundPhotographs { images, rejected, .. } = &mut found;
     for stack in stacks {
-        images[stack.reference].stack = stack.members.iter().map(|(_, member)| member.clone()).collect();
-        let reference = old.images[stack.reference].name.as_str();
+        let reference = &images[stack.reference].name;
         rejected.extend(
-            stack.left_out.iter().map(|(found, reason)| left_out(&old.images[found.photograph], reference, *reason)),
+            stack.left_out.iter().map(|(found, reason)| left_out(&images[found.photograph], reference, *reason)),
         );
+        images[stack.reference].stack = stack.members.iter().map(|(_, member)| member.clone()).collect();
     }
-    let kept: Vec<usize> = (0..images.len()).filter(|&number| numbering.stays(number)).collect();
-    let masks = AllMasks {
-        masks: kept.iter().map(|&number| old.files.given_masks(number)).collect(),
-        records: kept.iter().map(|&number| old.masks[number].clone()).collect(),
+    let found = FoundPhotographs {
+        images: numbering.those_that_stay(found.images),
+        masks: AllMasks {
+            masks: numbering.those_that_stay(found.masks.masks),
+            records: numbering.those_that_stay(found.masks.records),
+        },
+        light: WantedLight::Known(light),
+        ..found
     };
-    let in_memory = old.files.in_memory_photographs().clone();
-    let images = kept.iter().map(|&number| images[number].clone()).collect();
-    let light = WantedLight::Known(light);
-    let found = FoundPhotographs { images, in_memory, rejected, masks, light };
-    // What it says of the photographs' colors was told already.
-    let set = context.gather(|context| PhotographSet::open(found, options, context))?.value;
     let fused = stacks.iter().map(|stack| numbering.new_of(stack.reference)).collect();
-    Ok((PhotographSet { lens_from: old.lens_from, ..set }, fused))
+    Ok((PhotographSet::reopened(found, options, context)?, fused))
 }
 
 fn left_out(image: &SourceImage, reference: &str, reason: LeftOut) -> RejectedSource {
