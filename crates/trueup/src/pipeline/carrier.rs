@@ -15,7 +15,6 @@ use super::measure::Measurements;
 use super::measured::Measured;
 use super::photographs::PhotographSet;
 use super::shelf::{Shelf, ShelvedFeatures};
-use crate::job::masks::{blacken, curves_outside, lines_outside, outside};
 use crate::memo::KeyMaker;
 use crate::options::StitchOptions;
 
@@ -114,15 +113,11 @@ fn found(
 
 /// Forgets what was measured of the carrier, which `mask` marks in the photograph's pixels.
 fn forget(measured: &mut Measured, mask: &Mask, shelf: &Shelf) -> Result<()> {
-    let frame = &measured.frame;
-    let features = outside(measured.features.get()?.as_ref(), mask, frame);
-    let lines = lines_outside(std::mem::take(&mut measured.lines), mask, frame);
-    let curves = curves_outside(std::mem::take(&mut measured.curves), mask, frame);
-    blacken(&mut measured.thumbnail, mask, &measured.thumbnail_frame);
     let was_held = matches!(measured.features, ShelvedFeatures::Held(_));
-    let features = ShelvedFeatures::Held(features);
-    measured.features = if was_held { features } else { features.put_on(shelf) };
-    (measured.lines, measured.curves) = (lines, curves);
+    measured.forget(mask)?;
+    if !was_held {
+        measured.features = std::mem::take(&mut measured.features).put_on(shelf);
+    }
     Ok(())
 }
 

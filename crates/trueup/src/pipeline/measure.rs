@@ -16,9 +16,9 @@ use trueup_vision::padding::padding;
 
 use super::budget::MANY_PER_THREAD;
 use super::measured::Measured;
+use super::outside::blacken;
 use super::photographs::PhotographSet;
 use super::shelf::{Shelf, ShelvedFeatures};
-use crate::job::masks::{blacken, curves_outside, lines_outside, outside};
 use crate::memo::{Key, MEASURED, Memo};
 use crate::options::MeasureOptions;
 use crate::workers::Division;
@@ -214,19 +214,22 @@ fn measure(one: &OnePhotograph, options: &MeasureOptions, context: &StageContext
             })
         },
     );
-    let (mut features, (mut lines, mut curves)) = (features?, lines?);
-    let mut thumbnail = picture.thumbnail;
+    let (features, (lines, curves)) = (features?, lines?);
+    let mut measured = Measured {
+        frame,
+        features: ShelvedFeatures::Held(features),
+        lines,
+        curves,
+        gray: keep_grays.then(|| eight_bit(&picture.gray)),
+        border: even_border(&picture.gray),
+        padding: padding(&picture.gray),
+        thumbnail: picture.thumbnail,
+        thumbnail_frame: picture.thumbnail_frame,
+    };
     if let Some(ignored) = files.not_looked_at(index) {
-        features = outside(&features, &ignored, &frame);
-        lines = lines_outside(lines, &ignored, &frame);
-        curves = curves_outside(curves, &ignored, &frame);
-        blacken(&mut thumbnail, &ignored, &picture.thumbnail_frame);
+        measured.forget(&ignored)?;
     }
-    let (border, padding) = (even_border(&picture.gray), padding(&picture.gray));
-    let gray = keep_grays.then(|| eight_bit(&picture.gray));
-    let features = ShelvedFeatures::Held(features);
-    let thumbnail_frame = picture.thumbnail_frame;
-    Ok(Measured { frame, features, lines, curves, gray, thumbnail, thumbnail_frame, border, padding })
+    Ok(measured)
 }
 
 /// Gray values rounded to eight bits.

@@ -4,12 +4,14 @@ use serde::de::Error as _;
 use serde::ser::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use trueup_core::lines::{EdgeCurve, LineSegment};
+use trueup_core::mask::Mask;
 use trueup_core::raster::Raster;
 use trueup_core::source::WorkingFrame;
 use trueup_vision::border::EvenBorder;
 use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
 use trueup_vision::padding::Padding;
 
+use super::outside::{blacken, curves_outside, features_outside, lines_outside};
 use super::shelf::ShelvedFeatures;
 
 /// What is known of a photograph after its pixels were looked at.
@@ -29,6 +31,21 @@ pub(crate) struct Measured {
     pub border: EvenBorder,
     /// What is even between the picture's sides and a photograph askew in it, in working pixels.
     pub padding: Padding,
+}
+
+impl Measured {
+    /// Forgets what is in the parts that `ignored` marks in the photograph's pixels. Features are in memory then, wherever they were.
+    ///
+    /// # Errors
+    /// [`trueup_core::Error::Io`] if features cannot be read.
+    pub(crate) fn forget(&mut self, ignored: &Mask) -> trueup_core::Result<()> {
+        let frame = &self.frame;
+        self.features = ShelvedFeatures::Held(features_outside(self.features.get()?.as_ref(), ignored, frame));
+        self.lines = lines_outside(std::mem::take(&mut self.lines), ignored, frame);
+        self.curves = curves_outside(std::mem::take(&mut self.curves), ignored, frame);
+        blacken(&mut self.thumbnail, ignored, &self.thumbnail_frame);
+        Ok(())
+    }
 }
 
 impl Serialize for Measured {

@@ -17,6 +17,7 @@ pub(crate) mod matched;
 pub(crate) mod matching;
 pub(crate) mod measure;
 pub(crate) mod measured;
+mod outside;
 #[cfg(test)]
 mod phases_tests;
 pub(crate) mod photographs;

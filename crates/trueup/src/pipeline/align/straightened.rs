@@ -19,8 +19,8 @@ use trueup_io::decode::FilePhotographs;
 use trueup_vision::lines::{self, LineOptions};
 
 use super::component::Component;
-use crate::job::masks::lines_outside;
 use crate::pipeline::measure::THUMBNAIL_PIXELS;
+use crate::pipeline::outside::lines_outside;
 
 /// Largest tangent of the angle from the axis that is drawn, along each side: 56 degrees. What lies farther out is drawn so
 /// large that its edges are soft.
