@@ -1,6 +1,5 @@
 //! The carrier phase: what photographs show of what carries the camera, a bonnet or the legs of a drone, is taken from what is known of them.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use trueup_core::carrier::CarrierParts;
@@ -9,12 +8,11 @@ use trueup_core::mask::Mask;
 use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 use trueup_vision::carrier;
-use trueup_vision::features::{FeatureSource, Features, no_photograph};
 
 use super::measure::Measurements;
 use super::measured::Measured;
 use super::photographs::PhotographSet;
-use super::shelf::{Shelf, ShelvedFeatures};
+use super::shelf::{FeaturesOnShelf, Shelf, ShelvedFeatures};
 use crate::memo::KeyMaker;
 use crate::options::StitchOptions;
 
@@ -65,30 +63,6 @@ pub(super) fn run(input: CarrierInput, options: &StitchOptions, context: &StageC
     Ok(CarrierLeftOut { set: PhotographSet::reopened(photographs, options, context)?, measurements })
 }
 
-/// The features of photographs as they were measured.
-#[derive(Debug)]
-struct OfMeasured<'a>(&'a [Result<Measured>]);
-
-impl OfMeasured<'_> {
-    fn shelved(&self, photograph: usize) -> Option<&ShelvedFeatures> {
-        self.0.get(photograph)?.as_ref().ok().map(|measured| &measured.features)
-    }
-}
-
-impl FeatureSource for OfMeasured<'_> {
-    fn photographs(&self) -> usize {
-        self.0.len()
-    }
-
-    fn features(&self, photograph: usize) -> Result<Cow<'_, Features>> {
-        self.shelved(photograph).ok_or_else(|| no_photograph(photograph))?.get()
-    }
-
-    fn has_features(&self, photograph: usize) -> bool {
-        self.shelved(photograph).is_some_and(ShelvedFeatures::has_descriptors)
-    }
-}
-
 /// The photographs of each size that show a carrier, and where they do, in pixels of these.
 fn found(
     set: &PhotographSet,
@@ -99,7 +73,8 @@ fn found(
     for (number, image) in set.images.iter().enumerate().filter(|(number, _)| photographs[*number].is_ok()) {
         of_size.entry([image.width, image.height]).or_default().push(number);
     }
-    let features = OfMeasured(photographs);
+    let features = photographs.iter().map(|one| one.as_ref().ok().map(|one| &one.features));
+    let features = FeaturesOnShelf(features.collect());
     let mut found = Vec::new();
     for members in of_size.into_values() {
         let Ok(first) = &photographs[members[0]] else { continue };

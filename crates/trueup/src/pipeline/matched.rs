@@ -1,14 +1,11 @@
 //! The photographs after matching: what is known of them, which groups they make, and what cannot go on.
 
-use std::borrow::Cow;
-
 use trueup_align::stitch_graph::{GraphFile, StitchGraph};
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::RejectedSource;
-use trueup_vision::features::{self, FeatureSource, Features};
 use trueup_vision::matching::Stranger;
 
 use super::align::component::Component;
@@ -44,27 +41,10 @@ pub(crate) struct Matched {
 
 /// What matching looks at, taken out of the measurements so that it is gone when matching is done.
 pub(crate) struct LookedAt {
-    pub features: MeasuredFeatures,
+    /// `None` for photographs that could not be decoded.
+    pub features: Vec<Option<ShelvedFeatures>>,
     pub frames: Vec<WorkingFrame>,
     pub usable: Vec<bool>,
-}
-
-/// The features of all photographs, none of those that could not be decoded.
-#[derive(Debug)]
-pub(crate) struct MeasuredFeatures(Vec<ShelvedFeatures>);
-
-impl FeatureSource for MeasuredFeatures {
-    fn photographs(&self) -> usize {
-        self.0.len()
-    }
-
-    fn features(&self, photograph: usize) -> Result<Cow<'_, Features>> {
-        self.0.get(photograph).ok_or_else(|| features::no_photograph(photograph))?.get()
-    }
-
-    fn has_features(&self, photograph: usize) -> bool {
-        self.0.get(photograph).is_some_and(ShelvedFeatures::has_descriptors)
-    }
 }
 
 impl Matched {
@@ -96,7 +76,7 @@ impl Matched {
         LookedAt {
             frames: self.measured.iter().map(frame).collect(),
             usable: self.measured.iter().map(Option::is_some).collect(),
-            features: MeasuredFeatures(self.measured.iter_mut().map(|one| features(one).unwrap_or_default()).collect()),
+            features: self.measured.iter_mut().map(features).collect(),
         }
     }
 

@@ -59,7 +59,7 @@ use self::matched::Matched;
 use self::matching::MatchInput;
 use self::measure::MeasureInput;
 use self::photographs::{FoundPhotographs, PhotographSet};
-use self::shelf::Shelf;
+use self::shelf::{FeaturesOnShelf, Shelf};
 use self::stacking::{Stacked, StackingInput};
 use crate::job::inputs::Inputs;
 use crate::memo::{KeyMaker, Memo, PhotographCache};
@@ -180,7 +180,7 @@ impl<'a> Stitcher<'a> {
             let told = |(image, &frame): (&SourceImage, &WorkingFrame)| camera_prior(image, frame).told_lens(cameras);
             let told: Vec<ToldLens> = matched.set.images.iter().zip(&looked_at.frames).map(told).collect();
             let input = MatchInput {
-                features: &looked_at.features,
+                features: &FeaturesOnShelf(looked_at.features.iter().map(Option::as_ref).collect()),
                 frames: &looked_at.frames,
                 told: &told,
                 usable: &looked_at.usable,

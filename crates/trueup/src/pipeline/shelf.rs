@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use trueup_core::Result;
 use trueup_core::raster::Raster;
 use trueup_core::scratch::{ScratchFile, ScratchSpace};
-use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
+use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, FeatureSource, Features, no_photograph};
 
 /// What a point takes in the file: position, scale and response.
 type StoredPoint = [f64; 4];
@@ -115,6 +115,28 @@ impl ShelvedFeatures {
             Self::Held(features) => shelf.put(features),
             on_disk => on_disk,
         }
+    }
+}
+
+/// The features of photographs, wherever they are; none of those that could not be decoded, which are `None`.
+#[derive(Debug)]
+pub(crate) struct FeaturesOnShelf<'a>(pub Vec<Option<&'a ShelvedFeatures>>);
+
+impl FeatureSource for FeaturesOnShelf<'_> {
+    fn photographs(&self) -> usize {
+        self.0.len()
+    }
+
+    fn features(&self, photograph: usize) -> Result<Cow<'_, Features>> {
+        match self.0.get(photograph) {
+            Some(Some(features)) => features.get(),
+            Some(None) => Ok(Cow::Owned(Features::default())),
+            None => Err(no_photograph(photograph)),
+        }
+    }
+
+    fn has_features(&self, photograph: usize) -> bool {
+        self.0.get(photograph).copied().flatten().is_some_and(ShelvedFeatures::has_descriptors)
     }
 }
 
