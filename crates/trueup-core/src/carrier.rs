@@ -38,12 +38,6 @@ impl CarrierParts {
         Self { rectangles: self.rectangles.iter().map(|rectangle| rectangle.map(|side| side * scale)).collect() }
     }
 
-    /// The share of a picture of `size` pixels that they take up.
-    pub fn share_of(&self, [width, height]: [usize; 2]) -> f64 {
-        let marked: u64 = self.mask([width, height]).words().iter().map(|word| u64::from(word.count_ones())).sum();
-        marked as f64 / (width * height).max(1) as f64
-    }
-
     /// The pixels of a picture of `size` whose centers lie in them.
     pub fn mask(&self, [width, height]: [usize; 2]) -> Mask {
         Mask::from_rows(width, height, |y| {
@@ -86,7 +80,7 @@ mod tests {
         let expected = Mask::from_fn(8, 5, |x, y| (x < 3 && (2..4).contains(&y)) || (x >= 5 && y == 3));
         assert_eq!(parts.mask([8, 5]), expected);
         // 3 + 3 + 3 of 40.
-        assert_eq!(parts.share_of([8, 5]), 9.0 / 40.0);
+        assert_eq!(parts.mask([8, 5]).share(), 9.0 / 40.0);
         assert_eq!(parts.scaled(2.0).rectangles()[0], [0.0, 4.0, 7.0, 8.0]);
     }
 

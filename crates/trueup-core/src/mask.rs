@@ -66,6 +66,12 @@ impl Mask {
         &self.words
     }
 
+    /// The share of its pixels that are marked, 0 to 1.
+    pub fn share(&self) -> f64 {
+        let marked: u64 = self.words.iter().map(|word| u64::from(word.count_ones())).sum();
+        marked as f64 / (self.width * self.height).max(1) as f64
+    }
+
     /// Whether the pixel (x, y) is marked; nothing outside is.
     pub fn is_marked(&self, x: usize, y: usize) -> bool {
         let bit = y * self.width + x;

@@ -1,8 +1,6 @@
 //! The borders phase: photographs that lie inside an even border in their files, or askew in them, are measured again without what lies
 //! beside them.
 
-use std::collections::BTreeMap;
-
 use trueup_core::diagnostics::{Diagnostic, Reported, Subject, add_seconds};
 use trueup_core::inset::Inset;
 use trueup_core::outline::Outline;
@@ -11,7 +9,7 @@ use trueup_core::{Result, StageContext};
 use trueup_vision::border::EvenBorder;
 use trueup_vision::padding::{CommonPadding, Padding, StraightSided};
 
-use super::measure::{self, MeasureInput, Measurements};
+use super::measure::{self, MeasureInput, Measurements, OfOneSize};
 use super::measured::Measured;
 use super::photographs::PhotographSet;
 use super::shelf::Shelf;
@@ -100,16 +98,10 @@ pub(super) fn run(input: BordersInput, options: &StitchOptions, context: &StageC
 
 /// What of each photograph's file lies beside it.
 fn beside(images: &[SourceImage], measurements: &Measurements) -> Vec<Beside> {
-    let mut of_size: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
-    for (number, image) in images.iter().enumerate().filter(|(number, _)| measurements.photographs[*number].is_ok()) {
-        of_size.entry([image.width, image.height]).or_default().push(number);
-    }
     let mut beside = vec![Beside::default(); images.len()];
-    for (&size, members) in &of_size {
-        let measured: Vec<&Measured> =
-            members.iter().filter_map(|&number| measurements.photographs[number].as_ref().ok()).collect();
+    for (size, OfOneSize { numbers, measured }) in measurements.by_size(images) {
         let borders: Vec<EvenBorder> = measured.iter().map(|measured| measured.border).collect();
-        for ((&number, inset), measured) in members.iter().zip(of_one_size(&borders)).zip(&measured) {
+        for ((&number, inset), measured) in numbers.iter().zip(of_one_size(&borders)).zip(&measured) {
             let full = |pixels: usize| (pixels as f64 / measured.frame.working_from_full).ceil() as usize;
             let inset = inset.map(full);
             // Of a picture of a few pixels, nothing may be left.
@@ -117,7 +109,7 @@ fn beside(images: &[SourceImage], measurements: &Measurements) -> Vec<Beside> {
                 beside[number].inset = inset;
             }
         }
-        for ((&number, outline), measured) in members.iter().zip(outlines(&measured)).zip(&measured) {
+        for ((&number, outline), measured) in numbers.iter().zip(outlines(&measured)).zip(&measured) {
             if let Some(outline) = outline {
                 let outline = Some(outline.scaled(1.0 / measured.frame.working_from_full));
                 beside[number] = Beside { inset: Inset::default(), outline };

@@ -1,7 +1,5 @@
 //! The carrier phase: what photographs show of what carries the camera, a bonnet or the legs of a drone, is taken from what is known of them.
 
-use std::collections::BTreeMap;
-
 use trueup_core::carrier::CarrierParts;
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::mask::Mask;
@@ -9,7 +7,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 use trueup_vision::carrier;
 
-use super::measure::Measurements;
+use super::measure::{Measurements, OfOneSize};
 use super::measured::Measured;
 use super::photographs::PhotographSet;
 use super::shelf::{FeaturesOnShelf, Shelf, ShelvedFeatures};
@@ -41,46 +39,43 @@ pub(super) struct CarrierLeftOut {
 /// [`trueup_core::Error::Io`] if features cannot be read; [`trueup_core::Error::Limits`]; [`trueup_core::Error::Cancelled`].
 pub(super) fn run(input: CarrierInput, options: &StitchOptions, context: &StageContext) -> Result<CarrierLeftOut> {
     let CarrierInput { set, mut measurements, shelf } = input;
-    let found = context.time(STAGE, || found(&set, &measurements.photographs, context))?;
+    let found = context.time(STAGE, || found(&set.images, &measurements, context))?;
     if found.is_empty() {
         return Ok(CarrierLeftOut { set, measurements });
     }
     let mut photographs = set.into_found();
-    let images = &mut photographs.images;
-    for (members, parts) in &found {
-        let [width, height] = [images[members[0]].width, images[members[0]].height];
-        let mask = parts.mask([width, height]);
-        for &number in members {
-            images[number].carrier = Some(parts.clone());
+    for Shown { numbers, size, parts } in &found {
+        let mask = parts.mask(*size);
+        for &number in numbers {
+            photographs.images[number].carrier = Some(parts.clone());
             if let Ok(measured) = &mut measurements.photographs[number] {
                 forget(measured, &mask, shelf)?;
             }
             let key = measurements.keys[number].take();
             measurements.keys[number] = key.map(|key| KeyMaker::new().key(&key).part(parts).finish());
         }
-        context.report(note(members, parts, images));
+        context.report(note(numbers.len(), mask.share()));
     }
     Ok(CarrierLeftOut { set: PhotographSet::reopened(photographs, options, context)?, measurements })
 }
 
-/// The photographs of each size that show a carrier, and where they do, in pixels of these.
-fn found(
-    set: &PhotographSet,
-    photographs: &[Result<Measured>],
-    context: &StageContext,
-) -> Result<Vec<(Vec<usize>, CarrierParts)>> {
-    let mut of_size: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
-    for (number, image) in set.images.iter().enumerate().filter(|(number, _)| photographs[*number].is_ok()) {
-        of_size.entry([image.width, image.height]).or_default().push(number);
-    }
-    let features = photographs.iter().map(|one| one.as_ref().ok().map(|one| &one.features));
+/// The carrier that each of some photographs of one size shows.
+struct Shown {
+    numbers: Vec<usize>,
+    size: [usize; 2],
+    /// Where, in pixels of the photographs.
+    parts: CarrierParts,
+}
+
+fn found(images: &[SourceImage], measurements: &Measurements, context: &StageContext) -> Result<Vec<Shown>> {
+    let features = measurements.photographs.iter().map(|one| one.as_ref().ok().map(|one| &one.features));
     let features = FeaturesOnShelf(features.collect());
     let mut found = Vec::new();
-    for members in of_size.into_values() {
-        let Ok(first) = &photographs[members[0]] else { continue };
-        let frame = first.frame;
-        if let Some(parts) = carrier::find(&features, &members, &frame, context)? {
-            found.push((members, parts.scaled(1.0 / frame.working_from_full)));
+    for (size, OfOneSize { numbers, measured }) in measurements.by_size(images) {
+        // That of all of them.
+        let frame = &measured[0].frame;
+        if let Some(parts) = carrier::find(&features, &numbers, frame, context)? {
+            found.push(Shown { numbers, size, parts: parts.scaled(1.0 / frame.working_from_full) });
         }
     }
     Ok(found)
@@ -96,16 +91,15 @@ fn forget(measured: &mut Measured, mask: &Mask, shelf: &Shelf) -> Result<()> {
     Ok(())
 }
 
-fn note(members: &[usize], parts: &CarrierParts, images: &[SourceImage]) -> Diagnostic {
-    let SourceImage { width, height, .. } = images[members[0]];
-    let percent = 100.0 * parts.share_of([width, height]);
+/// Says that so many photographs show the carrier, in a `share` of each.
+fn note(photographs: usize, share: f64) -> Diagnostic {
+    let percent = 100.0 * share;
     Diagnostic::note(
         CARRIER_LEFT_OUT,
         Subject::stage("matching"),
         format!(
-            "{} photographs show the same at one place, whatever they look at ({percent:.0} % of each): what the camera is fixed to is not \
-             looked at, nor shown where another photograph can be",
-            members.len()
+            "{photographs} photographs show the same at one place, whatever they look at ({percent:.0} % of each): what the camera is fixed to \
+             is not looked at, nor shown where another photograph can be"
         ),
         "A mask of each photograph (--mask) marks it more exactly.",
     )
@@ -168,7 +162,7 @@ mod tests {
         assert!(with.project.diagnostics.iter().any(|one| one.code == CARRIER_LEFT_OUT));
         for (image, clean) in with.project.images.iter().zip(&without.project.images) {
             let parts = image.carrier.as_ref().expect("of every photograph");
-            assert!(parts.share_of([image.width, image.height]) > 0.1);
+            assert!(parts.mask([image.width, image.height]).share() > 0.1);
             // Squares of 40 working pixels, which may begin as much above it.
             let highest = parts.rectangles().iter().map(|&[_, top, ..]| top).fold(f64::INFINITY, f64::min);
             assert!(highest > (BONNET - 0.1) * image.height as f64, "{highest} of {}", image.height);

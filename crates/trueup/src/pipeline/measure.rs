@@ -1,12 +1,13 @@
 //! The measure phase: every photograph is decoded once, reduced, and measured.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 use trueup_core::diagnostics::Reported;
 use trueup_core::raster::Raster;
-use trueup_core::source::WorkingFrame;
+use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 use trueup_vision::border::even_border;
@@ -49,6 +50,30 @@ pub(crate) struct Measurements {
     pub photographs: Vec<Result<Measured>>,
     /// What decides each of them; all `None` where nothing is kept.
     pub keys: Vec<Option<Key>>,
+}
+
+/// Photographs of one size that could be decoded, one at least.
+#[derive(Default)]
+pub(crate) struct OfOneSize<'a> {
+    /// Ascending.
+    pub numbers: Vec<usize>,
+    /// Of each what was measured.
+    pub measured: Vec<&'a Measured>,
+}
+
+impl Measurements {
+    /// The photographs `images`, by their sizes.
+    pub(crate) fn by_size(&self, images: &[SourceImage]) -> BTreeMap<[usize; 2], OfOneSize<'_>> {
+        let mut by_size: BTreeMap<[usize; 2], OfOneSize> = BTreeMap::new();
+        for (number, (image, outcome)) in images.iter().zip(&self.photographs).enumerate() {
+            if let Ok(measured) = outcome {
+                let of_size = by_size.entry([image.width, image.height]).or_default();
+                of_size.numbers.push(number);
+                of_size.measured.push(measured);
+            }
+        }
+        by_size
+    }
 }
 
 /// One photograph to be measured.
