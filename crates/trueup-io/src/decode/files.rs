@@ -79,16 +79,16 @@ impl Kept {
     }
 }
 
-/// The masks of what shows the camera's carrier, by photograph: those that are alike are one.
+/// The masks of what shows the camera's carrier, by photograph: those that are alike, one behind the other, are one.
 fn carriers(sources: &[SourceImage]) -> Vec<Option<Arc<Mask>>> {
     let mut carriers: Vec<Option<Arc<Mask>>> = Vec::with_capacity(sources.len());
-    let look = |source: &SourceImage| ([source.width, source.height], source.carrier.clone());
-    for source in sources {
-        let size = [source.width, source.height];
-        let last = carriers.last().zip(sources.get(carriers.len().wrapping_sub(1)));
-        let carrier = match last {
-            Some((known, last)) if look(last) == look(source) => known.clone(),
-            _ => source.carrier.as_ref().map(|parts| Arc::new(parts.mask(size))),
+    for (number, source) in sources.iter().enumerate() {
+        let is_alike = |other: &SourceImage| {
+            (other.width, other.height, &other.carrier) == (source.width, source.height, &source.carrier)
+        };
+        let carrier = match number.checked_sub(1) {
+            Some(last) if is_alike(&sources[last]) => carriers[last].clone(),
+            _ => source.carrier.as_ref().map(|parts| Arc::new(parts.mask([source.width, source.height]))),
         };
         carriers.push(carrier);
     }
