@@ -11,6 +11,9 @@ use super::{Solution, graph_of, observations};
 /// Share of all agreeing matches in the pairs set aside beyond which it is asked whether the wrong ones are. Of cut sets without false overlaps it is 0.02
 /// at most, of most that false overlaps turn wrong 0.05 and more.
 const MUCH_SET_ASIDE: f64 = 0.02;
+/// The same share beyond which a warning says so, of the pairs that are set aside in the end. Of cut sets whose cameras are right without anything that
+/// repeats it is 0.02 at most.
+pub(super) const MUCH_AGAINST: f64 = 0.05;
 /// How many more agreeing matches cameras from the strongest pairs on have to confirm to be believed instead, relative: what parallax sets aside here
 /// or there is no more.
 const MORE_CONFIRMED: f64 = 0.02;
@@ -46,11 +49,14 @@ impl Belief<'_> {
     pub(super) fn best(&self) -> Result<Believed> {
         let all: Vec<usize> = (0..self.pairs.len()).collect();
         let found = self.of_all(&all)?;
-        if self.support(&found.contradicting) as f64 <= MUCH_SET_ASIDE * self.support(&all) as f64 {
+        let support = |positions: &[usize]| support(self.pairs, positions.iter().copied()) as f64;
+        if support(&found.contradicting) <= MUCH_SET_ASIDE * support(&all) {
             return Ok(found);
         }
         let other = self.of_strongest(&all)?;
-        let [confirmed, by_other] = [&found, &other].map(|one| self.confirmed(&one.solution) as f64);
+        // The residuals that told the other's contradictions are those of its cameras.
+        let by_other = self.confirmed(&other.told_rms_px) as f64;
+        let confirmed = self.confirmed(&self.residuals(&found.solution.by_matches)) as f64;
         Ok(if by_other > (1.0 + MORE_CONFIRMED) * confirmed { other } else { found })
     }
 
@@ -99,17 +105,15 @@ impl Belief<'_> {
         self.pairs.iter().map(|pair| observations::pair_rms(transfer, pair)).collect()
     }
 
-    /// Agreeing matches of the pairs that cameras confirm.
-    fn confirmed(&self, solution: &Solution) -> usize {
-        let rms_px = self.residuals(&solution.by_matches);
-        let confirmed: Vec<usize> = (0..rms_px.len()).filter(|&pair| rms_px[pair] <= self.max_rms_px).collect();
-        self.support(&confirmed)
+    /// Agreeing matches of the pairs that cameras with these residuals confirm.
+    fn confirmed(&self, rms_px: &[f64]) -> usize {
+        support(self.pairs, (0..rms_px.len()).filter(|&pair| rms_px[pair] <= self.max_rms_px))
     }
+}
 
-    /// Agreeing matches of the pairs at these positions.
-    fn support(&self, positions: &[usize]) -> usize {
-        positions.iter().map(|&position| self.pairs[position].agreeing).sum()
-    }
+/// Agreeing matches of the pairs at these positions.
+pub(super) fn support(pairs: &[PairMatches], positions: impl IntoIterator<Item = usize>) -> usize {
+    positions.into_iter().map(|position| pairs[position].agreeing).sum()
 }
 
 /// Those of `all`, ascending, that are not among `others`, ascending.
