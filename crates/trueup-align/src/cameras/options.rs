@@ -76,8 +76,9 @@ trueup_core::options! {
         /// Standard deviation of a focal length from metadata, relative. Lower it where the metadata are calibrated;
         /// raise it where a lens reports a focal length that is far from the true one.
         known_focal_sd: f64 = 0.1, between(0.001, 10.0), "";
-        /// Root mean square residual above which a pair is set aside, if the photographs stay connected without it.
-        /// Raise it to keep overlaps with parallax; lower it where a wrong pair bends the panorama.
+        /// Root mean square residual above which the cameras are found without a pair, if the photographs stay connected without
+        /// it. Of such pairs, only those that are overlaps for sure, and differ by up to three times as much, are still drawn
+        /// and measured. Raise it to keep overlaps with parallax; lower it where a wrong pair bends the panorama.
         max_pair_rms_px: f64 = 10.0, between(0.5, 1000.0), "working px";
     }
 }
