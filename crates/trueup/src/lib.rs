@@ -33,15 +33,18 @@ mod workers;
 
 pub use batch::{Batch, BatchJob, PhotographsOfFolder, SetOutcome, SetRecord, Shard};
 pub use job::{
-    ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, ReadFile, RecordedPanorama, Reference, SideOutput,
-    StitchJob, Written, thread_pool, write_thumbnail,
+    ComposeJob, FRAMES_TAKEN, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, RAW_DEVELOPED, ReadFile,
+    RecordedPanorama, Reference, SideOutput, StitchJob, Written, thread_pool, write_thumbnail,
 };
 pub use memo::{CacheUse, PhotographCache};
 pub use options::{
     AlignOptions, ArrangeOptions, ChangedOption, ComposeOptions, Evidence, MatchOptions, MeasureOptions, Method, Phase,
     RandomOptions, ResourceOptions, RunOptions, ShapeOptions, StitchOptions, Structure, WorkingOptions,
 };
-pub use pipeline::{Aligned, Alignment, MatchedPhotographs, PROJECTION_CUT, Stitcher};
+pub use pipeline::{
+    Aligned, Alignment, CARRIER_LEFT_OUT, CROP_TOO_SMALL, FRAMES_PASSED_OVER, MatchedPhotographs, PROJECTION_CUT,
+    Stitcher,
+};
 pub use project::{
     Canvas, CropRecord, FlatSceneRecord, HuginImage, HuginProject, ImageRecord, ImageStatus, LevelRecord, LineGuide,
     ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, ProjectionRecord,

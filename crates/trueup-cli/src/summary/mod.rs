@@ -14,8 +14,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use trueup::{
-    Crop, DRAWN_BY_CAMERAS, Diagnostic, FlatEvidence, FlatSceneRecord, LensKind, LineGuide, ORIENTATION_TAG_STALE,
-    OptionValue, PROJECTION_CUT, Project, Severity, Subject, Written, is_of_measures,
+    CARRIER_LEFT_OUT, CROP_TOO_SMALL, Crop, DRAWN_BY_CAMERAS, Diagnostic, FRAMES_PASSED_OVER, FRAMES_TAKEN,
+    FlatEvidence, FlatSceneRecord, LensKind, LineGuide, ORIENTATION_TAG_STALE, OptionValue, PROJECTION_CUT, Project,
+    RAW_DEVELOPED, Severity, Subject, Written, is_of_measures,
 };
 
 use crate::words::file_size;
@@ -249,13 +250,13 @@ fn upright(project: &Project) -> String {
 fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool, measured: Measured) {
     /// The codes of these notes.
     const ALWAYS: [&str; 7] = [
-        "carrier-left-out",
-        "crop-too-small",
+        CARRIER_LEFT_OUT,
+        CROP_TOO_SMALL,
         DRAWN_BY_CAMERAS,
-        "frames-passed-over",
-        "frames-taken",
+        FRAMES_PASSED_OVER,
+        FRAMES_TAKEN,
         ORIENTATION_TAG_STALE,
-        "raw-developed",
+        RAW_DEVELOPED,
     ];
     // Who asks for all is to know what is missing all the same.
     let wants_all = project.options.arrange.canvas.crop == Crop::None;

@@ -13,6 +13,9 @@ use super::inputs::Inputs;
 use super::made::{MadeFolder, WithMade};
 use super::outputs::Outputs;
 
+/// The code of camera raw photographs that were developed.
+pub const RAW_DEVELOPED: &str = "raw-developed";
+
 /// The stage under which progress is told.
 const STAGE: &str = "developing";
 
@@ -65,7 +68,7 @@ pub(super) fn with_developed(inputs: &Inputs, outputs: &Outputs, context: &Stage
         return Ok(Some(WithMade { inputs: inputs.clone(), told, made: None }));
     }
     told.push(Diagnostic::note(
-        "raw-developed",
+        RAW_DEVELOPED,
         Subject::file(folder.folder().display()),
         format!("{} camera raw photographs were developed by {} into this folder", developed.len(), developer.name()),
         "Keep that folder as long as the panorama may be composed again.",

@@ -20,6 +20,7 @@ mod video;
 mod write;
 
 pub use compose::ComposeJob;
+pub use developed::RAW_DEVELOPED;
 pub use inputs::{Inputs, Reference};
 pub use masks::{MaskFile, MaskKind, MaskRecord};
 pub use outputs::{Outputs, ReadFile};
@@ -28,4 +29,5 @@ pub use side_outputs::SideOutput;
 pub use stitch::StitchJob;
 pub use threads::thread_pool;
 pub use thumbnail::write_thumbnail;
+pub use video::FRAMES_TAKEN;
 pub use write::Written;

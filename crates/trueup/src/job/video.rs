@@ -12,6 +12,9 @@ use super::inputs::Inputs;
 use super::made::{MadeFolder, WithMade};
 use super::outputs::Outputs;
 
+/// The code of videos whose frames are used as photographs.
+pub const FRAMES_TAKEN: &str = "frames-taken";
+
 /// How the names of frames end.
 const FRAME_END: &str = ".png";
 
@@ -80,7 +83,7 @@ struct TakenFrames {
 impl TakenFrames {
     fn told(&self, video: &Path, folder: &Path) -> Diagnostic {
         Diagnostic::note(
-            "frames-taken",
+            FRAMES_TAKEN,
             Subject::file(video.display()),
             format!(
                 "{} of its {} frames are used as photographs, from {}",

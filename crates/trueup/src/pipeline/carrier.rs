@@ -14,8 +14,8 @@ use super::shelf::{FeaturesOnShelf, Shelf, ShelvedFeatures};
 use crate::memo::KeyMaker;
 use crate::options::StitchOptions;
 
-/// The code of what is told of it.
-const CARRIER_LEFT_OUT: &str = "carrier-left-out";
+/// The code of photographs in which what carries the camera is not looked at.
+pub const CARRIER_LEFT_OUT: &str = "carrier-left-out";
 
 /// The stage by which its time is told.
 const STAGE: &str = "matching";

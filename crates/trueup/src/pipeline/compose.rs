@@ -19,6 +19,9 @@ use trueup_io::encode::{self, OutputOptions};
 use crate::memo::{KeyMaker, LIGHT, Memo};
 use crate::options::ComposeOptions;
 
+/// The code of a panorama that was not cropped because too little would have been left.
+pub const CROP_TOO_SMALL: &str = "crop-too-small";
+
 /// A photograph's small copy, with the camera that took it.
 #[derive(Debug)]
 pub(crate) struct SmallPhotograph<'a> {
@@ -232,6 +235,6 @@ fn report_kept_whole(photographed: &Coverage, whole: &Rectangle, options: &Canva
             100.0 * options.min_kept
         );
         let hint = "Give --crop rectangle to crop it all the same, or another --projection.";
-        context.report(Diagnostic::note("crop-too-small", Subject::stage("panorama"), message, hint));
+        context.report(Diagnostic::note(CROP_TOO_SMALL, Subject::stage("panorama"), message, hint));
     }
 }

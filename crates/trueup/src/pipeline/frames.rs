@@ -19,6 +19,9 @@ use super::budget::Budget;
 use crate::job::inputs::{Inputs, Reference};
 use crate::options::StitchOptions;
 
+/// The code of files that are not used because they are frames of a video.
+pub const FRAMES_PASSED_OVER: &str = "frames-passed-over";
+
 /// Fewest files that are looked at: a second of video. Fewer are stitched soon enough as they are.
 const FEWEST: usize = 30;
 
@@ -165,7 +168,7 @@ impl Followed {
 fn told(run: &[SourceImage], used: usize) -> Diagnostic {
     let names = run.first().zip(run.last()).map(|(first, last)| format!("{} to {}", first.name, last.name));
     Diagnostic::note(
-        "frames-passed-over",
+        FRAMES_PASSED_OVER,
         Subject::file(names.unwrap_or_default()),
         format!("they are {} frames of a video, numbered in order, of which {used} are needed and used", run.len()),
         "Set source.frames to all to use every one.",

@@ -22,6 +22,7 @@ use crate::options::{MethodForm, StitchOptions};
 use crate::pipeline::align::Geometry;
 use crate::pipeline::align::component::Component;
 use crate::pipeline::arrange::{Arrangement, PROJECTION_CUT};
+use crate::pipeline::compose::CROP_TOO_SMALL;
 use crate::pipeline::matched::Matched;
 use crate::pipeline::photographs::PhotographSet;
 
@@ -182,7 +183,7 @@ const FOUND_IN_COMPOSING: [&str; 12] = [
     "color-converted",
     "color-profile-damaged",
     "color-profile-ignored",
-    "crop-too-small",
+    CROP_TOO_SMALL,
     "exposures-far-apart",
     "gaps-filled",
     "grid-folded",
