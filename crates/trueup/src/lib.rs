@@ -29,6 +29,8 @@ mod options;
 mod pipeline;
 mod project;
 mod report;
+#[cfg(test)]
+mod test_room;
 mod workers;
 
 pub use batch::{Batch, BatchJob, PhotographsOfFolder, SetOutcome, SetRecord, Shard};

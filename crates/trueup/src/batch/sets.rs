@@ -235,6 +235,7 @@ fn named(parts: Vec<Part>) -> Vec<PhotographsOfFolder> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_room::ROOM;
 
     #[test]
     fn what_was_taken_soon_after_belongs_together() {
@@ -259,7 +260,7 @@ mod tests {
     #[test]
     fn folders_are_sets_in_natural_order_without_what_is_hidden_linked_or_written() {
         let desk = tempfile::tempdir().expect("a folder");
-        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room");
+        let room = Path::new(ROOM);
         for folder in ["b10", "b9", ".hidden", "b9/deep", "out"] {
             std::fs::create_dir_all(desk.path().join(folder)).expect("a folder");
             for name in ["00.jpg", "01.jpg"] {
@@ -283,7 +284,7 @@ mod tests {
     fn a_folder_that_cannot_be_read_is_told_and_stops_nothing() {
         use std::os::unix::ffi::OsStrExt;
         let desk = tempfile::tempdir().expect("a folder");
-        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room/00.jpg");
+        let room = Path::new(ROOM).join("00.jpg");
         for folder in [&b"\xff"[..], b"good"] {
             let folder = desk.path().join(std::ffi::OsStr::from_bytes(folder));
             std::fs::create_dir(&folder).expect("a folder");
@@ -308,7 +309,7 @@ mod tests {
     #[test]
     fn a_folder_that_is_called_like_a_photograph_is_none() {
         let desk = tempfile::tempdir().expect("a folder");
-        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room");
+        let room = Path::new(ROOM);
         std::fs::create_dir_all(desk.path().join("x/a.jpg")).expect("a folder");
         std::fs::create_dir(desk.path().join("b.jpg")).expect("a folder");
         for name in ["00.jpg", "01.jpg"] {
@@ -322,7 +323,7 @@ mod tests {
     #[test]
     fn photographs_where_panoramas_are_written_are_told() {
         let desk = tempfile::tempdir().expect("a folder");
-        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room");
+        let room = Path::new(ROOM);
         let output = desk.path().join("day");
         for folder in ["other", "day/set/panorama_files", "day/within"] {
             std::fs::create_dir_all(desk.path().join(folder)).expect("a folder");
@@ -349,7 +350,7 @@ mod tests {
     fn a_photograph_whose_name_is_no_text_is_told() {
         use std::os::unix::ffi::OsStrExt;
         let desk = tempfile::tempdir().expect("a folder");
-        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room/00.jpg");
+        let room = Path::new(ROOM).join("00.jpg");
         for name in [&b"a.jpg"[..], b"b\xff.jpg"] {
             std::fs::copy(&room, desk.path().join(std::ffi::OsStr::from_bytes(name))).expect("copied");
         }

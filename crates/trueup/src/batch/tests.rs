@@ -10,11 +10,12 @@ use trueup_core::context::{CancelToken, Silent};
 use super::*;
 use crate::job::inputs::Inputs;
 use crate::job::{Outputs, StitchJob};
+use crate::test_room::ROOM;
 
 /// A tree of folders, each with three photographs of the room.
 fn tree(folders: &[&str]) -> TempDir {
     let desk = tempfile::tempdir().expect("a folder");
-    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room");
+    let room = Path::new(ROOM);
     for folder in folders {
         let folder = desk.path().join("in").join(folder);
         fs::create_dir_all(&folder).expect("a folder");

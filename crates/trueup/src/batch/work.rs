@@ -385,12 +385,13 @@ fn without_locks(output: &Path) -> Diagnostic {
 mod tests {
     use super::*;
     use crate::batch::BatchJob;
+    use crate::test_room::ROOM;
 
     /// As on a full disk, which takes the panorama and nothing more.
     #[test]
     fn what_a_failed_attempt_has_written_is_of_no_earlier_one() {
         let desk = tempfile::tempdir().expect("a folder");
-        let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room");
+        let room = Path::new(ROOM);
         let (photographs, output) = (desk.path().join("in"), desk.path().join("out"));
         std::fs::create_dir_all(&photographs).expect("a folder");
         for name in ["00.jpg", "01.jpg"] {

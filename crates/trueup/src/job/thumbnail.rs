@@ -35,10 +35,11 @@ pub fn write_thumbnail(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_room::ROOM;
 
     #[test]
     fn a_thumbnail_has_the_shape_of_its_photograph_and_no_more_pixels_than_asked_for() {
-        let photograph = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room/02.jpg");
+        let photograph = &format!("{ROOM}/02.jpg");
         let desk = tempfile::tempdir().expect("a folder");
         let (context, options) = (StageContext::default(), StitchOptions::default());
         let place = desk.path().join("small.png");

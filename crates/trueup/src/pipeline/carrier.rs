@@ -108,13 +108,12 @@ fn note(photographs: usize, share: f64) -> Diagnostic {
 #[cfg(test)]
 mod tests {
     use trueup_core::raster::Photograph;
-    use trueup_io::decode;
-    use trueup_io::source::{InMemory, SourceOptions, scan};
 
     use super::*;
     use crate::job::inputs::Inputs;
     use crate::memo::PhotographCache;
     use crate::pipeline::{Alignment, Stitcher};
+    use crate::test_room::room_in_memory;
 
     /// Where the bonnet begins, as a share of a photograph's height.
     const BONNET: f64 = 0.82;
@@ -132,17 +131,6 @@ mod tests {
         Photograph::Eight(raster)
     }
 
-    fn room(changed: impl Fn(Photograph) -> Photograph) -> Inputs {
-        let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
-        let scanned = scan(&[room.to_owned()], &SourceOptions::default(), &StageContext::default());
-        let files = scanned.expect("the room").photographs;
-        let mut in_memory = InMemory::default();
-        for file in &files {
-            in_memory.insert(&file.name, changed(decode::photograph(file).expect("decoded")));
-        }
-        Inputs { in_memory, ..Inputs::new(files.iter().map(|file| file.name.clone())) }
-    }
-
     fn aligned(inputs: &Inputs, cache: Option<&PhotographCache>) -> Alignment {
         let options = StitchOptions::default();
         let context = StageContext::default();
@@ -152,11 +140,11 @@ mod tests {
 
     #[test]
     fn cameras_before_a_bonnet_are_those_without() {
-        let without = aligned(&room(|photograph| photograph), None);
+        let without = aligned(&room_in_memory(|photograph| photograph), None);
         assert!(without.project.images.iter().all(|image| image.carrier.is_none()));
         let desk = tempfile::tempdir().expect("a folder");
         let cache = PhotographCache::open(desk.path(), 1e9).expect("a cache");
-        let inputs = room(before_a_bonnet);
+        let inputs = room_in_memory(before_a_bonnet);
         let with = aligned(&inputs, Some(&cache));
         assert_eq!(with.project.used(), 5);
         assert!(with.project.diagnostics.iter().any(|one| one.code == CARRIER_LEFT_OUT));

@@ -6,12 +6,13 @@ use trueup_core::options::OptionDescription;
 
 use super::*;
 use crate::options::Phase;
+use crate::test_room::ROOM;
 
 /// Enough to find overlaps and lines, and little to wait for.
 const WORKING_PIXELS: &str = "working.pixels=60000";
 
 fn photographs() -> Vec<String> {
-    let room = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room"));
+    let room = Path::new(ROOM);
     ["02.jpg", "03.jpg"].map(|name| room.join(name).display().to_string()).to_vec()
 }
 

@@ -225,13 +225,11 @@ fn nothing_found(inputs: &Inputs, rejected: &[RejectedSource]) -> Error {
 #[cfg(test)]
 mod tests {
     use trueup_compose::render::Rendered;
-    use trueup_core::raster::RowSource;
-    use trueup_io::decode;
-    use trueup_io::source::{InMemory, SourceOptions, scan};
 
     use super::*;
     use crate::memo::PhotographCache;
     use crate::pipeline::{Alignment, Stitcher};
+    use crate::test_room::{ROOM, room_in_memory, samples_of};
 
     fn stitched(inputs: &Inputs, options: &StitchOptions, cache: Option<&PhotographCache>) -> (Alignment, Rendered) {
         let context = StageContext::default();
@@ -241,39 +239,23 @@ mod tests {
         (alignment, rendered)
     }
 
-    fn rows(rendered: &Rendered) -> Vec<u8> {
-        let panorama = &rendered.panorama;
-        let mut samples = vec![0; panorama.width() * panorama.height() * 4];
-        for (y, row) in samples.chunks_exact_mut(panorama.width() * 4).enumerate() {
-            panorama.rgba8_row(y, row).expect("a row");
-        }
-        samples
-    }
-
     /// The photographs of the room say nothing of camera and colors: their pixels are all there is of them.
     #[test]
     fn photographs_in_memory_are_stitched_as_their_files_are_and_kept_by_their_pixels() {
-        let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
-        let context = StageContext::default();
-        let files = scan(&[room.to_owned()], &SourceOptions::default(), &context).expect("the room").photographs;
-        let mut in_memory = InMemory::default();
-        for file in &files {
-            in_memory.insert(&file.name, decode::photograph(file).expect("decoded"));
-        }
         let mut options = StitchOptions::default();
         options.set("canvas.scale=0.1").expect("an option");
-        let inputs = Inputs { in_memory, ..Inputs::new(files.iter().map(|file| file.name.clone())) };
+        let inputs = room_in_memory(|photograph| photograph);
         let desk = tempfile::tempdir().expect("a folder");
         let cache = PhotographCache::open(desk.path(), 1e9).expect("a cache");
-        let (from_files, rendered) = stitched(&Inputs::new([room]), &options, None);
+        let (from_files, rendered) = stitched(&Inputs::new([ROOM]), &options, None);
         for _ in 0..2 {
             let (alignment, again) = stitched(&inputs, &options, Some(&cache));
-            assert_eq!(rows(&again), rows(&rendered));
+            assert_eq!(samples_of(&again.panorama), samples_of(&rendered.panorama));
             assert_eq!(alignment.photograph_bits().expect("known"), from_files.photograph_bits().expect("known"));
             assert_eq!(alignment.project.images[0].path, "00.jpg");
             assert_eq!(alignment.project.images[0].mesh, from_files.project.images[0].mesh);
         }
         let found = cache.uses().get("measured").map_or(0, |one| one.found);
-        assert_eq!(found, files.len(), "the second time, nothing is measured");
+        assert_eq!(found, inputs.photographs.len(), "the second time, nothing is measured");
     }
 }

@@ -63,7 +63,6 @@ impl Alignment {
 
 #[cfg(test)]
 mod tests {
-    use trueup_core::raster::RowSource;
     use trueup_core::{Error, StageContext};
     use trueup_io::decode;
     use trueup_io::source::InMemory;
@@ -71,24 +70,19 @@ mod tests {
     use super::*;
     use crate::options::StitchOptions;
     use crate::project::record::Project;
+    use crate::test_room::{ROOM, samples_of};
 
     fn rows(stitcher: &Stitcher, alignment: &mut Alignment) -> Vec<u8> {
-        let panorama = stitcher.compose(alignment).expect("composed").panorama;
-        let mut samples = vec![0; panorama.width() * panorama.height() * 4];
-        for (y, row) in samples.chunks_exact_mut(panorama.width() * 4).enumerate() {
-            panorama.rgba8_row(y, row).expect("a row");
-        }
-        samples
+        samples_of(&stitcher.compose(alignment).expect("composed").panorama)
     }
 
     #[test]
     fn an_alignment_serves_other_views_and_other_photographs() {
-        let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
         let context = StageContext::default();
         let mut options = StitchOptions::default();
         options.set("canvas.scale=0.1").expect("an option");
         let stitcher = Stitcher::new(&options, &context);
-        let mut alignment = stitcher.align(&Inputs::new([room])).expect("aligned").alignments.remove(0);
+        let mut alignment = stitcher.align(&Inputs::new([ROOM])).expect("aligned").alignments.remove(0);
         let own = rows(&stitcher, &mut alignment);
         let mut same = stitcher.rearrange(&alignment, None).expect("the same");
         assert_eq!(rows(&stitcher, &mut same), own);
@@ -110,7 +104,7 @@ mod tests {
 
         // Measured as if it had been stitched in that view, by the names that the photographs have there.
         let stitched =
-            Stitcher::new(&round, &context).align(&Inputs::new([room])).expect("aligned").alignments.remove(0);
+            Stitcher::new(&round, &context).align(&Inputs::new([ROOM])).expect("aligned").alignments.remove(0);
         let mut measured = Stitcher::new(&round, &context).rearrange(&alignment, None).expect("another view").project;
         assert!(measured.measures.is_some() && measured.measures != alignment.project.measures);
         assert_eq!(measured.measures, stitched.project.measures);

@@ -369,6 +369,7 @@ mod tests {
     use crate::job::inputs::{Inputs, Reference};
     use crate::memo::PhotographCache;
     use crate::pipeline::Stitcher;
+    use crate::test_room::{ROOM, samples_of};
 
     /// Those of one reason are told in one line.
     #[test]
@@ -384,7 +385,7 @@ mod tests {
 
     /// Two photographs of the room, each at three exposures, as if their names were those of files.
     fn brackets() -> (Vec<String>, InMemory) {
-        let room = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room"));
+        let room = Path::new(ROOM);
         let (mut names, mut in_memory) = (Vec::new(), InMemory::default());
         for number in ["02", "03"] {
             let path = room.join(format!("{number}.jpg")).display().to_string();
@@ -400,14 +401,6 @@ mod tests {
             }
         }
         (names, in_memory)
-    }
-
-    fn rows(panorama: &dyn RowSource) -> Vec<u8> {
-        let mut samples = vec![0; panorama.width() * panorama.height() * 4];
-        for (y, row) in samples.chunks_exact_mut(panorama.width() * 4).enumerate() {
-            panorama.rgba8_row(y, row).expect("a row");
-        }
-        samples
     }
 
     #[test]
@@ -439,9 +432,9 @@ mod tests {
             let told = project.diagnostics.iter().filter(|one| one.code == "stack-fused").count();
             assert_eq!(told, 2);
             assert!(project.diagnostics.iter().all(|one| one.code != "near-duplicate"), "{:?}", project.diagnostics);
-            pictures.push(rows(&stitcher.compose(&mut alignment).expect("composed").panorama));
+            pictures.push(samples_of(&stitcher.compose(&mut alignment).expect("composed").panorama));
             let mut again = stitcher.rearrange(&alignment, None).expect("rearranged");
-            pictures.push(rows(&stitcher.compose(&mut again).expect("composed").panorama));
+            pictures.push(samples_of(&stitcher.compose(&mut again).expect("composed").panorama));
         }
         assert!(pictures.iter().all(|picture| *picture == pictures[0]));
         let used = cache.uses().get("measured").map_or([0, 0], |one| [one.found, one.made]);
@@ -483,10 +476,10 @@ mod tests {
         let panorama = light.compose(&mut merged).expect("composed").panorama;
         // In the unit of the reference, which is the darkest here: what is white in it.
         assert!((0.9..range.peak as f32).contains(&brightest(&panorama)), "{}", brightest(&panorama));
-        assert_ne!(rows(&panorama), rows(&fused));
+        assert_ne!(samples_of(&panorama), samples_of(&fused));
         let mut again = light.rearrange(&merged, None).expect("rearranged");
         assert_eq!(again.project.light, Some(range));
-        assert_eq!(rows(&light.compose(&mut again).expect("composed").panorama), rows(&panorama));
+        assert_eq!(samples_of(&light.compose(&mut again).expect("composed").panorama), samples_of(&panorama));
         // For a panorama that does not keep it, it must be asked for.
         options.set("stacks.fuse=light").expect("an option");
         let asked = Stitcher::new(&options, &context).align(&inputs).expect("aligned").alignments.remove(0);

@@ -260,17 +260,17 @@ mod tests {
     use crate::job::inputs::Inputs;
     use crate::options::StitchOptions;
     use crate::pipeline::Stitcher;
+    use crate::test_room::ROOM;
 
     /// A narrow view into the middle of the room: the photographs at its ends are not in it.
     #[test]
     fn what_the_view_does_not_show_is_not_measured() {
-        let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
         let mut options = StitchOptions::default();
         for assignment in ["canvas.scale=0.2", "projection.kind=perspective", "projection.fov=20"] {
             options.set(assignment).expect("an option");
         }
         let context = StageContext::default();
-        let aligned = Stitcher::new(&options, &context).align(&Inputs::new([room])).expect("a panorama");
+        let aligned = Stitcher::new(&options, &context).align(&Inputs::new([ROOM])).expect("a panorama");
         let project = &aligned.alignments[0].project;
         let is_left_out = |path: &str| {
             let index = project.images.iter().position(|image| image.path == path);

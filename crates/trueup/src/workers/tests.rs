@@ -3,7 +3,6 @@
 use std::sync::Mutex;
 
 use trueup_compose::render::Rendered;
-use trueup_core::raster::RowSource;
 use trueup_core::{Error, StageContext};
 use trueup_io::decode;
 use trueup_io::source::InMemory;
@@ -13,8 +12,7 @@ use crate::job::Inputs;
 use crate::memo::PhotographCache;
 use crate::options::StitchOptions;
 use crate::pipeline::{Alignment, Stitcher};
-
-const ROOM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
+use crate::test_room::{ROOM, samples_of};
 
 /// Does tasks in the wrong order, each by a worker of its own.
 #[derive(Default)]
@@ -63,15 +61,6 @@ fn stitched(
     Ok((alignment, rendered))
 }
 
-fn rows(rendered: &Rendered) -> Vec<u8> {
-    let panorama = &rendered.panorama;
-    let mut samples = vec![0; panorama.width() * panorama.height() * 4];
-    for (y, row) in samples.chunks_exact_mut(panorama.width() * 4).enumerate() {
-        panorama.rgba8_row(y, row).expect("a row");
-    }
-    samples
-}
-
 /// The record without what differs from run to run.
 fn record(alignment: &Alignment) -> String {
     let mut project = alignment.project.clone();
@@ -90,7 +79,7 @@ fn a_panorama_that_is_divided_is_the_same() {
         let here = Here::default();
         let (divided, again) = stitched(&inputs, &options, None, Some(&here)).expect("divided");
         assert_eq!(record(&divided), record(&alone), "{assignments:?}");
-        assert!(rows(&again) == rows(&rendered), "{assignments:?}");
+        assert!(samples_of(&again.panorama) == samples_of(&rendered.panorama), "{assignments:?}");
         let least = if assignments == ["render.blend=feather"] { 2 } else { 4 };
         assert!(*here.tasks.lock().expect("no test failed") >= least, "{assignments:?}");
     }
@@ -121,7 +110,7 @@ fn photographs_that_only_one_program_holds_are_not_handed_out() {
     let here = Here::default();
     let inputs = Inputs { in_memory, ..Inputs::new(names) };
     let (_, again) = stitched(&inputs, &options, None, Some(&here)).expect("divided");
-    assert!(rows(&again) == rows(&rendered));
+    assert!(samples_of(&again.panorama) == samples_of(&rendered.panorama));
     assert_eq!(*here.tasks.lock().expect("no test failed"), 1, "pairs alone: features can be handed over");
 }
 
