@@ -10,6 +10,7 @@ pub mod match_points;
 pub mod mesh;
 pub mod metrics;
 mod moving_dlt;
+pub mod parallax;
 mod plane_similarity;
 pub mod projection;
 pub mod similarity;

@@ -75,12 +75,12 @@ impl SphereCoverage {
 }
 
 /// Pixels spread over a photograph, so many along each side, its border included.
-pub(super) fn samples(photograph: &PosedPhotograph, count: usize) -> impl Iterator<Item = Vector2<f64>> + use<> {
+pub(crate) fn samples(photograph: &PosedPhotograph, count: usize) -> impl Iterator<Item = Vector2<f64>> + use<> {
     spread_pixels(Vector2::new(photograph.mesh.width, photograph.mesh.height), count)
 }
 
 /// The largest angle from the horizon of `frame` (from the level world) that a photograph reaches, radians.
-pub(super) fn steepest(photograph: &PosedPhotograph, frame: &Matrix3<f64>) -> f64 {
+pub(crate) fn steepest(photograph: &PosedPhotograph, frame: &Matrix3<f64>) -> f64 {
     let down = frame.row(1).transpose();
     if shows(photograph, down) || shows(photograph, -down) {
         return PI / 2.0;

@@ -8,7 +8,7 @@ use trueup_core::geometry::wrap_angle;
 use trueup_core::mesh::{GridLines, GridMesh};
 
 use super::coverage::shows;
-use super::parallax::ParallaxShift;
+use super::parallax_shift::ParallaxShift;
 use super::photograph::PosedPhotograph;
 use super::view::ProjectionView;
 
@@ -46,7 +46,7 @@ const WIDEST: f64 = 0.45 * PI;
 
 /// Places every photograph's grid.
 ///
-/// `shifts` holds for every photograph what [`super::parallax_shifts`] found.
+/// `shifts` holds for every photograph what [`crate::parallax::shifts`] found.
 pub fn place(photographs: &[PosedPhotograph], shifts: &[ParallaxShift], placement: &Placement<'_>) -> Vec<PlacedGrid> {
     let drawings: Vec<Vec<GridMesh>> = photographs
         .par_iter()

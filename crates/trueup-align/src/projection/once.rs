@@ -8,7 +8,7 @@ use trueup_core::geometry::wrap_angle;
 use trueup_core::mesh::GridMesh;
 
 use super::grid::Placement;
-use super::parallax::ParallaxShift;
+use super::parallax_shift::ParallaxShift;
 use super::photograph::PosedPhotograph;
 
 /// Largest distance of the middle of a cell's side from the true map, in canvas pixels, that even division is to reach. A

@@ -201,7 +201,7 @@ fn upright_height(height: f64) -> f64 {
 }
 
 /// 0 below the first value, 1 above the second, smooth between.
-pub(super) fn smooth(value: f64, [from, to]: [f64; 2]) -> f64 {
+pub(crate) fn smooth(value: f64, [from, to]: [f64; 2]) -> f64 {
     let share = ((value - from) / (to - from)).clamp(0.0, 1.0);
     share * share * (3.0 - 2.0 * share)
 }

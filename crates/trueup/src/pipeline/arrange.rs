@@ -9,6 +9,7 @@ use nalgebra::Matrix3;
 use serde::Serialize;
 use trueup_align::mesh::CameraPlane;
 use trueup_align::metrics::without_torn_cells;
+use trueup_align::parallax;
 use trueup_align::projection::{
     self, FlatKind, ParallaxShift, Placement, PosedPhotograph, Projection, ProjectionOptions, ProjectionView,
 };
@@ -299,7 +300,7 @@ fn parallax_shifts(
         sizes.eq(input.photographs.iter().map(|photograph| photograph.mesh.len()))
     };
     memo.found_or_made(PARALLAX, key.as_ref(), is_whole, || {
-        let found = projection::parallax_shifts(input.photographs, input.period, max_parallax);
+        let found = parallax::shifts(input.photographs, input.period, max_parallax);
         context.check_cancelled()?;
         Ok(found)
     })

@@ -18,50 +18,19 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::mesh::GridMesh;
 use trueup_core::statistics::median_of;
 
-use super::coverage::{samples, steepest};
-use super::photograph::PosedPhotograph;
-use super::seen::smooth;
 use crate::mesh::{LATTICE_CELLS, Meeting, coarsening_of_steps, smooth_steps, tilt_from_level};
-
-/// By how many of its own pixels each vertex of a photograph's grid looks aside, row-major.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(from = "Vec<[f64; 2]>", into = "Vec<[f64; 2]>")]
-pub struct ParallaxShift {
-    /// One for each vertex; bilinear between.
-    pub aside: Vec<Vector2<f64>>,
-}
-
-impl From<Vec<[f64; 2]>> for ParallaxShift {
-    fn from(aside: Vec<[f64; 2]>) -> Self {
-        Self { aside: aside.into_iter().map(Vector2::from).collect() }
-    }
-}
-
-impl From<ParallaxShift> for Vec<[f64; 2]> {
-    fn from(shift: ParallaxShift) -> Self {
-        shift.aside.into_iter().map(<[f64; 2]>::from).collect()
-    }
-}
-
-impl ParallaxShift {
-    /// The pixel whose ray is drawn where `pixel` of the photograph over which `mesh` lies is shown.
-    pub(super) fn looked_through(&self, mesh: &GridMesh, pixel: Vector2<f64>) -> Vector2<f64> {
-        let (corners, shares) = mesh.bilinear(pixel);
-        (0..4).fold(pixel, |sum, k| sum + self.aside[corners[k]] * shares[k])
-    }
-}
+use crate::projection::{ParallaxShift, PosedPhotograph, samples, smooth, steepest};
 
 /// What the overlaps ask of every photograph.
 ///
 /// * `period`: the turn of the mesh's plane, if it closes on itself.
 /// * `max_parallax`: the largest angle in radians between where a camera sees a place and where it is drawn; from half
 ///   of it on, corrections fade, since a mesh that has to contradict its cameras more than that is torn itself.
-pub fn parallax_shifts(photographs: &[PosedPhotograph], period: Option<f64>, max_parallax: f64) -> Vec<ParallaxShift> {
+pub fn shifts(photographs: &[PosedPhotograph], period: Option<f64>, max_parallax: f64) -> Vec<ParallaxShift> {
     let overlaps = Overlaps::new(photographs, period, max_parallax);
     let steps = overlaps.smooth_steps();
     (0..photographs.len())
@@ -352,7 +321,7 @@ mod tests {
     #[test]
     fn what_agrees_stays() {
         let photographs = pair([0.0; 2]);
-        let shifts = parallax_shifts(&photographs, None, 0.03);
+        let shifts = shifts(&photographs, None, 0.03);
         assert_eq!(shifts.len(), 2);
         for (shift, photograph) in shifts.iter().zip(&photographs) {
             assert_eq!(shift.aside.len(), photograph.mesh.len());
@@ -366,7 +335,7 @@ mod tests {
     #[test]
     fn overlaps_meet_and_the_rest_goes_on() {
         let photographs = pair([4.0, -3.0]);
-        let shifts = parallax_shifts(&photographs, None, 0.03);
+        let shifts = shifts(&photographs, None, 0.03);
         for pixel in [[450.0, 300.0], [600.0, 200.0], [700.0, 450.0]].map(Vector2::from) {
             let start = photographs[0].camera.transfer(&photographs[1].camera, pixel).expect("in front");
             let same = photographs[1].mesh.source_of(photographs[0].mesh.warp(pixel), start).expect("overlapping");
@@ -389,7 +358,7 @@ mod tests {
     #[test]
     fn contradictions_are_left_to_the_cameras() {
         let photographs = pair([50.0, 0.0]);
-        let shifts = parallax_shifts(&photographs, None, 0.03);
+        let shifts = shifts(&photographs, None, 0.03);
         assert_eq!(shifts.len(), 2);
         for (shift, photograph) in shifts.iter().zip(&photographs) {
             assert_eq!(shift.aside.len(), photograph.mesh.len());
@@ -406,7 +375,7 @@ mod tests {
             let overlaps = Overlaps::new(&photographs, None, 0.1);
             let reach = photographs.iter().map(|one| steepest(one, &Matrix3::identity()).to_degrees());
             assert!(reach.clone().all(|reach| (75.0..85.0).contains(&reach)), "{:?}", reach.collect::<Vec<_>>());
-            let shifts = parallax_shifts(&photographs, None, 0.1);
+            let shifts = shifts(&photographs, None, 0.1);
             let aside = shifts.iter().flat_map(|shift| &shift.aside).map(Vector2::norm).fold(0.0, f64::max);
             ([0, 1].map(|k| overlaps.parallax(k, &down)), overlaps.trusts, aside)
         };
@@ -470,9 +439,9 @@ mod tests {
     /// The same pair with the second mesh a turn farther.
     #[test]
     fn overlaps_meet_across_the_turn() {
-        let near = parallax_shifts(&pair([4.0, -3.0]), None, 0.03);
+        let near = shifts(&pair([4.0, -3.0]), None, 0.03);
         let period = std::f64::consts::TAU * 700.0;
-        let far = parallax_shifts(&pair([4.0 + period, -3.0]), Some(period), 0.03);
+        let far = shifts(&pair([4.0 + period, -3.0]), Some(period), 0.03);
         assert_eq!((near.len(), far.len()), (2, 2));
         let moved = near.iter().flat_map(|shift| &shift.aside).map(Vector2::norm).fold(0.0, f64::max);
         assert!(moved > 1.0, "the overlap asks for {moved} px only");
