@@ -23,6 +23,7 @@
 mod batch;
 #[doc(hidden)]
 pub mod fuzzing;
+mod inputs;
 mod job;
 mod memo;
 mod options;
@@ -34,9 +35,10 @@ mod test_room;
 mod workers;
 
 pub use batch::{Batch, BatchJob, PhotographsOfFolder, SetOutcome, SetRecord, Shard};
+pub use inputs::{Inputs, MaskFile, Reference};
 pub use job::{
-    ComposeJob, FRAMES_TAKEN, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, RAW_DEVELOPED, ReadFile,
-    RecordedPanorama, Reference, SideOutput, StitchJob, Written, thread_pool, write_thumbnail,
+    ComposeJob, FRAMES_TAKEN, Outputs, RAW_DEVELOPED, ReadFile, RecordedPanorama, SideOutput, StitchJob, Written,
+    thread_pool, write_thumbnail,
 };
 pub use memo::{CacheUse, PhotographCache};
 pub use options::{
@@ -49,8 +51,8 @@ pub use pipeline::{
 };
 pub use project::{
     Canvas, CropRecord, FlatSceneRecord, HuginImage, HuginProject, ImageRecord, ImageStatus, LevelRecord, LineGuide,
-    ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, ProjectionRecord,
-    StackMemberRecord, hugin_project, read_project,
+    ManhattanRecord, MaskKind, MaskRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
+    ProjectionRecord, StackMemberRecord, hugin_project, read_project,
 };
 pub use report::brightness::BrightnessStep;
 pub use report::evaluation::{

@@ -5,7 +5,7 @@ use trueup_core::raster::{Photograph, RowSource};
 use trueup_io::decode;
 use trueup_io::source::{InMemory, SourceOptions, scan};
 
-use crate::job::inputs::Inputs;
+use crate::inputs::Inputs;
 
 /// The folder of the five photographs of a room.
 pub(crate) const ROOM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");

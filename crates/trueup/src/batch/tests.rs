@@ -8,7 +8,7 @@ use tempfile::TempDir;
 use trueup_core::context::{CancelToken, Silent};
 
 use super::*;
-use crate::job::inputs::Inputs;
+use crate::inputs::Inputs;
 use crate::job::{Outputs, StitchJob};
 use crate::test_room::ROOM;
 

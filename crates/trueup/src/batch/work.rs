@@ -21,7 +21,7 @@ use super::foreign;
 use super::names::{self, PANORAMA};
 use super::record::{PHOTOGRAPHS, SetOutcome, SetRecord, UNREADABLE, below, milliseconds, now_ms};
 use super::{Batch, PhotographsOfFolder};
-use crate::job::inputs::Inputs;
+use crate::inputs::Inputs;
 use crate::job::{Outputs, SideOutput, StitchJob};
 use crate::options::StitchOptions;
 use crate::pipeline::memory_of_each;

@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use trueup_core::{Result, StageContext};
 
-use super::inputs::Inputs;
-use super::masks::MaskFile;
 use super::outputs::{Outputs, ReadFile};
 use super::reopen::RecordedPanorama;
 use super::threads::thread_pool;
 use super::write::Written;
+use crate::inputs::{Inputs, MaskFile};
 use crate::options::StitchOptions;
 use crate::pipeline::Stitcher;
 use crate::project::paths::place_of;

@@ -9,9 +9,9 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::developing::Developer;
 use trueup_io::{encode, source};
 
-use super::inputs::Inputs;
 use super::made::{MadeFolder, WithMade};
 use super::outputs::Outputs;
+use crate::inputs::Inputs;
 
 /// The code of camera raw photographs that were developed.
 pub const RAW_DEVELOPED: &str = "raw-developed";

@@ -11,9 +11,9 @@ use trueup_core::diagnostics::Diagnostic;
 use trueup_core::{Error, Result};
 use trueup_io::encode::PendingFolder;
 
-use super::inputs::{Inputs, Reference};
 use super::outputs::Outputs;
 use super::write::Written;
+use crate::inputs::{Inputs, Reference};
 
 /// The file that lists what was made in its folder. Hidden, so that the folder can be given as one of photographs.
 const LIST: &str = ".made-by-trueup.json";
@@ -226,7 +226,8 @@ fn refuse_outputs(folder: &Path, outputs: &Outputs) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::masks::{MaskFile, MaskKind};
+    use crate::inputs::MaskFile;
+    use crate::project::record::MaskKind;
 
     /// A run for `pano.jpg` on the desk, which reads `photographs` there.
     fn begin(desk: &Path, photographs: &[&str]) -> Result<MadeFolder> {

@@ -1,13 +1,9 @@
-//! Jobs: what is to be stitched, and the files that are to come of it.
+//! Jobs: from inputs, or a project, to the files that are to come of them.
 
 mod compose;
 mod developed;
-pub(crate) mod inputs;
 mod layers;
-pub(crate) mod lens_from;
 mod made;
-pub(crate) mod masks;
-pub(crate) mod names;
 mod outputs;
 mod reopen;
 mod side_outputs;
@@ -21,8 +17,6 @@ mod write;
 
 pub use compose::ComposeJob;
 pub use developed::RAW_DEVELOPED;
-pub use inputs::{Inputs, Reference};
-pub use masks::{MaskFile, MaskKind, MaskRecord};
 pub use outputs::{Outputs, ReadFile};
 pub use reopen::RecordedPanorama;
 pub use side_outputs::SideOutput;

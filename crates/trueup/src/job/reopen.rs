@@ -6,11 +6,11 @@ use trueup_core::Result;
 use trueup_core::source::SourceImage;
 use trueup_io::source::InMemory;
 
-use super::masks::{AllMasks, MaskFile, MaskRecord};
+use crate::inputs::{AllMasks, MaskFile};
 use crate::pipeline::light::WantedLight;
 use crate::pipeline::photographs::FoundPhotographs;
 use crate::pipeline::{Alignment, Stitcher};
-use crate::project::record::{ImageRecord, Project};
+use crate::project::record::{ImageRecord, MaskRecord, Project};
 use crate::project::replace::{other_photographs, recorded_photographs};
 
 /// A recorded panorama, and where its photographs are.

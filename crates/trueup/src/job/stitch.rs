@@ -8,12 +8,12 @@ use trueup_core::{Result, StageContext};
 use trueup_io::encode;
 
 use super::developed::with_developed;
-use super::inputs::Inputs;
 use super::made::{WithMade, settle};
 use super::outputs::{Outputs, ReadFile};
 use super::threads::thread_pool;
 use super::video::with_frames;
 use super::write::Written;
+use crate::inputs::Inputs;
 use crate::memo::PhotographCache;
 use crate::options::StitchOptions;
 use crate::pipeline::Stitcher;

@@ -8,9 +8,9 @@ use trueup_io::source::RejectedSource;
 use trueup_io::{encode, video};
 use trueup_vision::frames::FrameChooser;
 
-use super::inputs::Inputs;
 use super::made::{MadeFolder, WithMade};
 use super::outputs::Outputs;
+use crate::inputs::Inputs;
 
 /// The code of videos whose frames are used as photographs.
 pub const FRAMES_TAKEN: &str = "frames-taken";

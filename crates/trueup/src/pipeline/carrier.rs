@@ -110,7 +110,7 @@ mod tests {
     use trueup_core::raster::Photograph;
 
     use super::*;
-    use crate::job::inputs::Inputs;
+    use crate::inputs::Inputs;
     use crate::memo::PhotographCache;
     use crate::pipeline::{Alignment, Stitcher};
     use crate::test_room::room_in_memory;

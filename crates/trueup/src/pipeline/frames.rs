@@ -16,7 +16,7 @@ use trueup_io::source::FrameUse;
 use trueup_vision::frames::FrameChooser;
 
 use super::budget::Budget;
-use crate::job::inputs::{Inputs, Reference};
+use crate::inputs::{Inputs, Reference};
 use crate::options::StitchOptions;
 
 /// The code of files that are not used because they are frames of a video.

@@ -14,8 +14,8 @@ use super::measure::{Measurements, concerns_one_photograph};
 use super::measured::Measured;
 use super::photographs::PhotographSet;
 use super::shelf::ShelvedFeatures;
-use crate::job::inputs::{Inputs, Reference};
-use crate::job::names::reference_named;
+use crate::inputs::reference_named;
+use crate::inputs::{Inputs, Reference};
 use crate::memo::{Key, KeyMaker};
 use crate::report::left_out::{
     LeftOut, counts, explain, no_photograph, none_usable, not_in_graph, of_another_panorama, reason_of_rejected,

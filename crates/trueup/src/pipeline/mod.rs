@@ -64,7 +64,7 @@ use self::measure::MeasureInput;
 use self::photographs::{FoundPhotographs, PhotographSet};
 use self::shelf::{FeaturesOnShelf, Shelf};
 use self::stacking::{Stacked, StackingInput};
-use crate::job::inputs::Inputs;
+use crate::inputs::Inputs;
 use crate::memo::{KeyMaker, Memo, PhotographCache};
 use crate::options::StitchOptions;
 use crate::project::fill::{GeometryRecord, fill_geometry, place, record_composition, unfilled};

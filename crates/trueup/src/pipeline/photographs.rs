@@ -17,12 +17,13 @@ use trueup_io::source::{self, InMemory, RejectedSource, Sources};
 use super::budget::{Budget, Measuring};
 use super::frames;
 use super::light::{self, WantedLight};
-use crate::job::inputs::{Inputs, Reference};
-use crate::job::lens_from::tell_lenses;
-use crate::job::masks::{AllMasks, MaskRecord};
-use crate::job::names::reference_named;
+use crate::inputs::AllMasks;
+use crate::inputs::reference_named;
+use crate::inputs::tell_lenses;
+use crate::inputs::{Inputs, Reference};
 use crate::memo::KeyMaker;
 use crate::options::StitchOptions;
+use crate::project::record::MaskRecord;
 use crate::report::left_out::{none_usable, reason_of_rejected};
 
 /// Photographs that were found, before their colors are looked into.

@@ -8,8 +8,8 @@ use super::Stitcher;
 use super::light::WantedLight;
 use super::photographs::FoundPhotographs;
 use super::results::Alignment;
-use crate::job::inputs::Inputs;
-use crate::job::masks::AllMasks;
+use crate::inputs::AllMasks;
+use crate::inputs::Inputs;
 use crate::project::record::ImageRecord;
 use crate::project::replace::named_photographs;
 

@@ -17,7 +17,7 @@ use super::light::{self, WantedLight};
 use super::measure::{self, MeasureInput, Measurements, THUMBNAIL_PIXELS, concerns_one_photograph};
 use super::photographs::{FoundPhotographs, PhotographSet};
 use super::shelf::Shelf;
-use crate::job::masks::AllMasks;
+use crate::inputs::AllMasks;
 use crate::memo::{Key, KeyMaker, Memo, STACKS};
 use crate::options::StitchOptions;
 
@@ -366,7 +366,7 @@ mod tests {
     use trueup_io::source::{InMemory, SourceOptions, scan};
 
     use super::*;
-    use crate::job::inputs::{Inputs, Reference};
+    use crate::inputs::{Inputs, Reference};
     use crate::memo::PhotographCache;
     use crate::pipeline::Stitcher;
     use crate::test_room::{ROOM, samples_of};

@@ -15,8 +15,8 @@ use std::path::Path;
 pub use hugin::{HuginImage, HuginProject, hugin_project};
 pub use projection::ProjectionRecord;
 pub use record::{
-    Canvas, CropRecord, FlatSceneRecord, ImageRecord, ImageStatus, LevelRecord, LineGuide, ManhattanRecord, MeshRecord,
-    PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, StackMemberRecord,
+    Canvas, CropRecord, FlatSceneRecord, ImageRecord, ImageStatus, LevelRecord, LineGuide, ManhattanRecord, MaskKind,
+    MaskRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, StackMemberRecord,
 };
 use trueup_core::{Error, Result, StageContext};
 

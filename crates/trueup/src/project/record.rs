@@ -21,7 +21,6 @@ use trueup_io::source::unique_names;
 
 use super::paths::file_name;
 use super::projection::ProjectionRecord;
-use crate::job::masks::MaskRecord;
 use crate::options::StitchOptions;
 use crate::report::measures::Measures;
 
@@ -62,6 +61,33 @@ pub struct MeshRecord {
 fn places_or_nowhere<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D::Error> {
     let places = Vec::<[Option<f64>; 2]>::deserialize(deserializer)?;
     Ok(places.into_iter().map(|place| place.map(|coordinate| coordinate.unwrap_or(f64::NAN))).collect())
+}
+
+/// What a mask means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MaskKind {
+    /// White parts are used; black or transparent ones are ignored: not looked at, and not shown where another photograph
+    /// can be.
+    Use,
+    /// White parts are shown, whatever other photographs show there; black or transparent ones are left to the seams.
+    Keep,
+}
+
+/// A mask as the project records it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MaskRecord {
+    /// The picture's file as it was given.
+    pub path: String,
+    /// What it means.
+    pub kind: MaskKind,
+}
+
+impl MaskRecord {
+    /// The file's name without folders; paths written on another system are understood.
+    pub fn file_name(&self) -> &str {
+        file_name(&self.path)
+    }
 }
 
 /// Another exposure of the view of a photograph, fused with it, or with [`Project::light`] merged. It is of the same size.

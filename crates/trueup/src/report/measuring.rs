@@ -257,7 +257,7 @@ fn long_lines(lines: &[Vec<MeasuredLine>], path: impl Fn(usize) -> String) -> Op
 mod tests {
     use trueup_core::StageContext;
 
-    use crate::job::inputs::Inputs;
+    use crate::inputs::Inputs;
     use crate::options::StitchOptions;
     use crate::pipeline::Stitcher;
     use crate::test_room::ROOM;

@@ -8,7 +8,7 @@ use trueup_io::decode;
 use trueup_io::source::InMemory;
 
 use super::*;
-use crate::job::Inputs;
+use crate::inputs::Inputs;
 use crate::memo::PhotographCache;
 use crate::options::StitchOptions;
 use crate::pipeline::{Alignment, Stitcher};

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
 use trueup_core::mask::{Mask, Masks};
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
@@ -11,18 +10,8 @@ use trueup_io::decode;
 use trueup_io::source::{InMemory, SourceOptions};
 
 use super::names::photograph_named;
-use crate::project::paths::{file_name, place_of};
-
-/// What a mask means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MaskKind {
-    /// White parts are used; black or transparent ones are ignored: not looked at, and not shown where another photograph
-    /// can be.
-    Use,
-    /// White parts are shown, whatever other photographs show there; black or transparent ones are left to the seams.
-    Keep,
-}
+use crate::project::paths::place_of;
+use crate::project::record::{MaskKind, MaskRecord};
 
 /// A picture that marks parts of a photograph.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -34,22 +23,6 @@ pub struct MaskFile {
     pub file: PathBuf,
     /// What it means.
     pub kind: MaskKind,
-}
-
-/// A mask as the project records it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MaskRecord {
-    /// The picture's file as it was given.
-    pub path: String,
-    /// What it means.
-    pub kind: MaskKind,
-}
-
-impl MaskRecord {
-    /// The file's name without folders; paths written on another system are understood.
-    pub fn file_name(&self) -> &str {
-        file_name(&self.path)
-    }
 }
 
 /// The masks of every photograph.

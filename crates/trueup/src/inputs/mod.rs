@@ -1,5 +1,9 @@
 //! What is to be stitched, and what the user wants of it.
 
+mod lens_from;
+mod masks;
+mod names;
+
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -7,7 +11,10 @@ use trueup_align::stitch_graph::{GraphFile, parse_graph_file};
 use trueup_core::Result;
 use trueup_io::source::{self, InMemory, RejectedSource};
 
-use super::masks::MaskFile;
+pub(crate) use lens_from::tell_lenses;
+pub(crate) use masks::AllMasks;
+pub use masks::MaskFile;
+pub(crate) use names::reference_named;
 
 /// Which photograph sets the panorama's pixel scale and stays in place.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
