@@ -5,8 +5,9 @@ use trueup_core::camera::Camera;
 use trueup_core::matches::PairMatches;
 
 use super::contradictions::contradicting_pairs;
+use super::observations;
+use super::solution::{Solution, graph_of};
 use super::transfer::CameraTransfer;
-use super::{Solution, graph_of, observations};
 
 /// Share of all agreeing matches in the pairs set aside beyond which it is asked whether the wrong ones are. Of cut sets without false overlaps it is 0.02
 /// at most, of most that false overlaps turn wrong 0.05 and more.

@@ -6,7 +6,8 @@ use trueup_core::matches::PairMatches;
 
 use super::believed::{MUCH_AGAINST, support};
 use super::expected_focal::OpenFocal;
-use super::{CameraPrior, Solution};
+use super::prior::CameraPrior;
+use super::solution::Solution;
 
 /// Doubt about the corners of photographs, working pixels, one standard deviation, that is worth a word: a lens that moves them by
 /// five times as much, a hundredth of a photograph, would not be noticed.

@@ -5,8 +5,8 @@
 //! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
 //! bundle adjustment (`bundle`), from coarse to fine (`refinement`), photographs that differ with focal lengths of their own where a lens was zoomed (`zoom`).
 //! Terms of the lenses are added as long as the matches, and
-//! edges that are to be straight (`straightness`), are sure of them (`lenses`, `lens_evidence`; of few overlaps `lens_by_residual`): a pinhole stays one. Pairs that then contradict the others are set
-//! aside (`contradictions`). Focal lengths that parallax leaves open are those that are expected, in part (`expected_focal`), and those through which lines lie at right angles (`directions`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
+//! edges that are to be straight (`straightness`), are sure of them (`lenses`, `lens_evidence`; of few overlaps `lens_by_residual`): a pinhole stays one. All this is a `solution`. Pairs that then contradict the others are set
+//! aside (`contradictions`), unless cameras without the weaker ones explain more (`believed`). Focal lengths that parallax leaves open are those that are expected, in part (`expected_focal`), and those through which lines lie at right angles (`directions`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
 //! (`flat_scene`, by `plane_adjustment`), and lines say how it is turned (`upright_plane`).
 
 mod believed;
@@ -33,6 +33,7 @@ mod plane_camera;
 mod prior;
 mod refinement;
 mod rotations;
+mod solution;
 mod straightness;
 mod transfer;
 mod upright_plane;
@@ -44,14 +45,9 @@ use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::matches::PairMatches;
 use trueup_core::{Result, StageContext};
 
-use crate::stitch_graph::{GraphEdge, StitchGraph};
 use believed::{Belief, Believed};
-use bundle::Parameters;
-use expected_focal::OpenFocal;
 use flat_scene::FlatInput;
-use intrinsics::InitialIntrinsics;
-use observations::{MATCHES_PER_PAIR, MATCHES_PER_PAIR_FOR_LENSES, Observations};
-use refinement::RefinementInput;
+use solution::{Seen, Solution, graph_of, solve};
 use straightness::CurveObservations;
 
 pub use flat_scene::{FlatEvidence, FlatScene};
@@ -190,59 +186,6 @@ fn turn_to(cameras: &mut [Camera], reference: usize) {
     for camera in cameras {
         camera.set_rotation(&(camera.rotation() * back));
     }
-}
-
-struct Solution {
-    cameras: Vec<Camera>,
-    /// As the matches alone have them.
-    by_matches: Vec<Camera>,
-    /// Where these leave focal lengths open.
-    opened: Option<OpenFocal>,
-    per_picture_focal: bool,
-    focal_failed: bool,
-    /// See [`refinement::Refined`].
-    lens_doubt_px: Option<f64>,
-}
-
-/// What was seen of the photographs.
-#[derive(Clone, Copy)]
-struct Seen<'a> {
-    pairs: &'a [&'a PairMatches],
-    curves: &'a CurveObservations,
-    /// Line segments of each photograph.
-    lines: &'a [Vec<LineSegment>],
-}
-
-/// The cameras by what was seen, relative to photograph `anchor`.
-fn solve(
-    priors: &[CameraPrior],
-    Seen { pairs, curves, lines }: Seen<'_>,
-    anchor: usize,
-    options: &CameraOptions,
-    context: &StageContext,
-) -> Result<Solution> {
-    let observations = Observations::choose(priors, pairs, MATCHES_PER_PAIR);
-    let for_lenses = Observations::choose(priors, pairs, MATCHES_PER_PAIR_FOR_LENSES);
-    let intrinsics = focal::initial_intrinsics(priors, pairs, &observations, options);
-    let relative = rotations::relative_rotations(priors, pairs, &observations, &intrinsics);
-    let graph = graph_of(priors.len(), pairs.iter().copied());
-    let rotations = rotations::average(&graph, pairs, &relative, anchor);
-    let InitialIntrinsics { focal_px, lenses } = intrinsics;
-    let start = Parameters { focal_px, rotations, lenses };
-    let input = RefinementInput { priors, observations: &observations, for_lenses: &for_lenses, curves, lines, anchor };
-    let refined = refinement::refine(input, &start, options, context)?;
-    Ok(Solution {
-        cameras: refined.parameters.cameras(priors),
-        by_matches: refined.by_matches.as_ref().map_or(&refined.parameters, |found| &found.parameters).cameras(priors),
-        opened: refined.by_matches.map(|found| found.opened),
-        per_picture_focal: refined.per_picture_focal,
-        focal_failed: refined.focal_failed,
-        lens_doubt_px: refined.lens_doubt_px,
-    })
-}
-
-fn graph_of<'a>(photographs: usize, pairs: impl Iterator<Item = &'a PairMatches>) -> StitchGraph {
-    StitchGraph::from_edges(photographs, pairs.map(GraphEdge::of).collect())
 }
 
 #[cfg(test)]

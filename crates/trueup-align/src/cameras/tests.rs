@@ -7,10 +7,11 @@ use trueup_core::lens::{Lens, LensProjection, LensTerms};
 use trueup_core::matches::{PairVerdict, PointMatch, PointMatches};
 use trueup_core::source::WorkingFrame;
 
-use super::bundle::BundleAdjustment;
+use super::bundle::{BundleAdjustment, Parameters};
 use super::contradictions::contradicting_pairs;
 use super::intrinsics::LensState;
 use super::lenses::LensSearch;
+use super::observations::Observations;
 use super::rotations::relative_rotation;
 use super::*;
 
