@@ -212,6 +212,15 @@ impl BaseMap {
     }
 }
 
+/// The grids as their bases place them.
+pub(super) fn placed(grids: &[GridMesh], places: &[Vec<Vector2<f64>>]) -> Vec<GridMesh> {
+    let one = |(grid, places): (&GridMesh, &Vec<Vector2<f64>>)| GridMesh {
+        target: places.iter().map(|&place| place.into()).collect(),
+        ..grid.clone()
+    };
+    grids.iter().zip(places).map(one).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use trueup_core::geometry::{rotation_about_y, rotation_about_z};

@@ -41,10 +41,10 @@ mod warped_mesh;
 
 use nalgebra::Vector2;
 use trueup_core::diagnostics::{Diagnostic, Subject};
-use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result, StageContext};
 
 use alignment::AlignmentEnergy;
+use base::placed;
 pub(crate) use base::tilt_from_level;
 pub use base::{BaseMap, bases, bases_on_drawing, bases_on_plane, tilts, turn_length};
 pub use by_cameras::{ByCamerasInput, DRAWN_BY_CAMERAS, drawn_by_cameras, unless_worse};
@@ -117,15 +117,6 @@ pub fn run<'a>(input: &MeshInput<'a>, options: &'a MeshOptions, context: &StageC
         "Look whether the photographs beside the cut show the same; --graph names the pairs to be matched.",
     ));
     Ok(open)
-}
-
-/// The grids as their bases place them.
-fn placed(grids: &[GridMesh], places: &[Vec<Vector2<f64>>]) -> Vec<GridMesh> {
-    let one = |(grid, places): (&GridMesh, &Vec<Vector2<f64>>)| GridMesh {
-        target: places.iter().map(|&place| place.into()).collect(),
-        ..grid.clone()
-    };
-    grids.iter().zip(places).map(one).collect()
 }
 
 #[cfg(test)]

@@ -7,12 +7,12 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
 use super::alignment::AlignmentEnergy;
+use super::base::placed;
 use super::current_grids::CurrentGrids;
 use super::input::MeshInput;
 use super::line_alignment;
 use super::normal_equations::NormalEquations;
 use super::options::MeshOptions;
-use super::placed;
 use super::problem::{MeshProblem, Solved};
 use super::refinements::Refinements;
 use super::similarity::PRIOR_SLOPE;

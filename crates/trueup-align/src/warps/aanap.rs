@@ -256,7 +256,7 @@ impl<'a> LocalHomographies<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::WarpModel;
+    use super::super::options::WarpModel;
     use super::super::tests::{Example, HEIGHT, WIDTH, matched, misalignment};
     use super::*;
     use crate::warps::placement::anchored;

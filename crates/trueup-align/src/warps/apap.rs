@@ -5,11 +5,11 @@ use rayon::prelude::*;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
-use super::WarpModel;
 use super::distance_kernel::DistanceKernel;
 use super::homography::undetermined;
 use super::input::WarpInput;
 use super::limits::{MIN_DEPTH, depth_at, refuse, with_depth};
+use super::options::WarpModel;
 use super::options::WarpOptions;
 use super::placement::one_after_another;
 use crate::moving_dlt::{MovingDlt, WEIGHT_FLOOR};

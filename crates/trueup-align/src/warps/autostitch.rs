@@ -7,9 +7,9 @@ use trueup_core::geometry::wrap_angle;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result};
 
-use super::WarpModel;
 use super::input::WarpInput;
 use super::limits::{MIN_DEPTH, refuse};
+use super::options::WarpModel;
 use super::options::{AutostitchSurface, WarpOptions};
 use crate::mesh::divided;
 

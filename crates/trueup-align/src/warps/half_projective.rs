@@ -6,12 +6,12 @@ use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
-use super::WarpModel;
 use super::deformed::deformed;
 use super::half_planes::{HalfPlanes, Route, Samples, distortion};
 use super::homography::onto;
 use super::input::WarpInput;
 use super::limits::{farthest_angle, refuse};
+use super::options::WarpModel;
 use super::options::WarpOptions;
 use super::sphp::SphpWarp;
 

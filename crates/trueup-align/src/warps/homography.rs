@@ -7,10 +7,10 @@ use trueup_core::matches::PointMatch;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result};
 
-use super::WarpModel;
 use super::deformed::deformed;
 use super::input::{STAGE, WarpInput};
 use super::limits::{MIN_DEPTH, farthest_angle, least_depth, refuse, with_depth};
+use super::options::WarpModel;
 use super::options::{HomographySource, WarpOptions};
 use crate::stitch_graph::StitchGraph;
 

@@ -7,8 +7,8 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::options::OptionValue;
 use trueup_core::{Error, Result};
 
-use super::WarpModel;
 use super::input::WarpInput;
+use super::options::WarpModel;
 use crate::mesh::count_folds;
 
 /// Depth, relative to the distance, below which a viewing direction counts as beside or behind the panorama's plane:

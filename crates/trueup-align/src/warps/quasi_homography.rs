@@ -5,11 +5,11 @@ use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
-use super::WarpModel;
 use super::deformed::deformed;
 use super::homography::{of_pair_or_cameras, undetermined};
 use super::input::WarpInput;
 use super::limits::check_depth_in_overlap;
+use super::options::WarpModel;
 use super::options::WarpOptions;
 use crate::stitch_graph::StitchGraph;
 
