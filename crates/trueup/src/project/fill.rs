@@ -9,7 +9,6 @@ use trueup_compose::exposure::{Correction, Corrections, Response};
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::geometry::{matrix_from_rows, rows_of};
-use trueup_core::inset::Inset;
 use trueup_core::lens::PlacedLens;
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::{SourceImage, StackMember};
@@ -60,11 +59,11 @@ pub(crate) fn unfilled(
                 component: component.filter(|_| matched.measured[index].is_some()),
                 stack: stack_record(image),
                 masks: matched.set.masks[index].clone(),
-                ..left_out_record(image.path.display().to_string(), reason, hint)
+                ..ImageRecord::left_out(image.path.display().to_string(), reason, hint)
             }
         })
         .chain(matched.set.rejected.iter().map(|rejected| {
-            left_out_record(rejected.path.display().to_string(), rejected.reason.clone(), rejected.hint.clone())
+            ImageRecord::left_out(rejected.path.display().to_string(), rejected.reason.clone(), rejected.hint.clone())
         }))
         .collect();
     let pairs = matched.pairs.iter().map(|pair| PairRecord {
@@ -128,39 +127,6 @@ fn stack_record(image: &SourceImage) -> Vec<StackMemberRecord> {
         reference_from_member: member.reference_from_member,
     };
     image.stack.iter().map(record).collect()
-}
-
-/// The record of a photograph without geometry.
-pub(crate) fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
-    ImageRecord {
-        path,
-        width: 0,
-        height: 0,
-        inset: Inset::default(),
-        outline: None,
-        carrier: None,
-        orientation: 0,
-        status: ImageStatus::LeftOut,
-        reason,
-        hint,
-        component: None,
-        camera: None,
-        lens_told: false,
-        focal_px: None,
-        lens: None,
-        rotation: None,
-        upright_rotation: None,
-        place: None,
-        theta_deg: None,
-        scale: None,
-        gain: None,
-        correction: None,
-        stack: Vec::new(),
-        masks: Vec::new(),
-        vanishing_points: None,
-        mesh: None,
-        solved_mesh: None,
-    }
 }
 
 /// The deformed grids over the full-resolution photographs; a single photograph stays as it is.

@@ -416,6 +416,39 @@ pub struct Project {
 }
 
 impl ImageRecord {
+    /// A photograph without geometry.
+    pub(crate) fn left_out(path: String, reason: String, hint: String) -> Self {
+        Self {
+            path,
+            width: 0,
+            height: 0,
+            inset: Inset::default(),
+            outline: None,
+            carrier: None,
+            orientation: 0,
+            status: ImageStatus::LeftOut,
+            reason,
+            hint,
+            component: None,
+            camera: None,
+            lens_told: false,
+            focal_px: None,
+            lens: None,
+            rotation: None,
+            upright_rotation: None,
+            place: None,
+            theta_deg: None,
+            scale: None,
+            gain: None,
+            correction: None,
+            stack: Vec::new(),
+            masks: Vec::new(),
+            vanishing_points: None,
+            mesh: None,
+            solved_mesh: None,
+        }
+    }
+
     /// Rows of the rotation from the levelled world to the camera, as the photograph's own lines correct it where that is
     /// recorded.
     pub(crate) fn level_rotation(&self) -> Option<&[[f64; 3]; 3]> {

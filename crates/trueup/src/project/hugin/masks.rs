@@ -117,7 +117,6 @@ mod tests {
     use trueup_core::inset::Inset;
     use trueup_core::outline::Outline;
 
-    use super::super::super::fill::left_out_record;
     use super::*;
 
     fn outlined(orientation: u8, inset: Inset, corners: &[[f64; 2]]) -> ImageRecord {
@@ -127,7 +126,7 @@ mod tests {
             orientation,
             inset,
             outline: Outline::new(corners.to_vec()),
-            ..left_out_record("a.jpg".to_owned(), String::new(), String::new())
+            ..ImageRecord::left_out("a.jpg".to_owned(), String::new(), String::new())
         }
     }
 

@@ -1,4 +1,4 @@
-//! The cameras of a panorama as a project of the Hugin stitcher, written and read (`read`, by the lines of `parse`).
+//! The cameras of a panorama as a project of the Hugin stitcher, written and read (`read`, by the lines of `parse`; drawn in `panorama`).
 //!
 //! # Source
 //! The format: Hugin's own description of its project files (`doc/nona.txt` of panotools and the manual's page on `.pto`).
@@ -17,6 +17,7 @@ use trueup_core::{Error, Result};
 use super::record::{ImageRecord, Project};
 
 mod masks;
+mod panorama;
 mod parse;
 mod read;
 
@@ -325,7 +326,7 @@ mod tests {
             height: 800,
             orientation: 6,
             lens: Some(lens),
-            ..super::super::fill::left_out_record("a b.jpg".to_owned(), String::new(), String::new())
+            ..ImageRecord::left_out("a b.jpg".to_owned(), String::new(), String::new())
         };
         let line = image_line(&record, &camera_from_level, 670.0).expect("a line");
         let read = HuginProject::parse(&format!("# hugin project file\n{line}\n"), "a.pto").expect("a project");
@@ -347,7 +348,7 @@ mod tests {
     #[test]
     fn names_that_end_early_are_refused() {
         for name in ["a\".jpg", "a\n.jpg"] {
-            let record = super::super::fill::left_out_record(name.to_owned(), String::new(), String::new());
+            let record = ImageRecord::left_out(name.to_owned(), String::new(), String::new());
             let refused = image_line(&record, &Matrix3::identity(), 670.0).expect_err("not readable").to_string();
             assert!(refused.contains("ends it in a Hugin project"), "{refused}");
         }
