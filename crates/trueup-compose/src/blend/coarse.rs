@@ -5,6 +5,7 @@ use trueup_core::Result;
 
 use super::levels::WholeLevels;
 use super::shown::ShownWhere;
+use super::things::{Beside, ShownAlone, take_out};
 use crate::label::{Label, NOBODY};
 use crate::pyramid::{
     LEAST_SHARE, LEAST_WEIGHT, NEXT_TO_NOTHING, PyramidPlane, add_base, add_detail, collapse, level_shares,
@@ -28,10 +29,11 @@ impl CoarseBlend<'_> {
     /// What is blended is how each photograph differs from the level cut along the seams, which is added back: with masks that
     /// add up to 1 that is the same. But beside its border a photograph's coarser samples are means of one side only. Those of
     /// the photograph itself say that a bright sky beyond the border is as dark as the building before it, and the sky becomes
-    /// gray; those of a difference say that it goes on as it is.
+    /// gray; those of a difference say that it goes on as it is. What differs because one photograph shows a thing that another does not is no
+    /// light ([`take_out`]).
     pub(super) fn blend(&self) -> Result<PyramidPlane<[f32; 4]>> {
-        let (cut, masks) = self.cut()?;
-        let change = self.blended_differences(&cut, &masks)?;
+        let Cut { level: cut, masks, shown } = self.cut()?;
+        let change = self.blended_differences(&cut, &masks, &shown)?;
         let mut blended = cut;
         for (blended, change) in blended.texels.iter_mut().zip(&change.texels) {
             let [r, g, b, _] = *change;
@@ -47,21 +49,24 @@ impl CoarseBlend<'_> {
         PyramidPlane::new(0..width, 0..height)
     }
 
-    /// The first level cut along the seams, and every placement's mask.
-    fn cut(&self) -> Result<(PyramidPlane<[f32; 4]>, Vec<CountedMask>)> {
+    /// Cuts the first level along the seams.
+    fn cut(&self) -> Result<Cut> {
         let mut cut = self.zeros(0);
         let mut masks = Vec::with_capacity(self.own.len());
+        let mut shown = ShownAlone::new([cut.columns.len(), cut.rows.len()]);
         let masked = |placement: usize| {
             let level = self.own.read(placement)?;
             let mask = self.mask(&level, placement);
             Ok((level, mask))
         };
         in_order(self.own.len(), masked, |(level, mask): (_, CountedMask)| {
-            add_base(&mut cut, &level.plane, &mask.over(&level.plane));
+            let over = mask.over(&level.plane);
+            add_base(&mut cut, &level.plane, &over);
+            shown.set(masks.len() as Label, &over);
             masks.push(mask);
         })?;
         collapse(&mut cut, None);
-        Ok((cut, masks))
+        Ok(Cut { level: cut, masks, shown })
     }
 
     /// How the photographs differ from the level that is `cut`, blended.
@@ -69,12 +74,15 @@ impl CoarseBlend<'_> {
         &self,
         cut: &PyramidPlane<[f32; 4]>,
         masks: &[CountedMask],
+        shown: &ShownAlone,
     ) -> Result<PyramidPlane<[f32; 4]>> {
         let mut sums: Vec<PyramidPlane<[f32; 4]>> = (0..=self.levels.above).map(|level| self.zeros(level)).collect();
         let differences = |placement: usize| {
             let mut level = self.own.read(placement)?.into_owned();
             let mask = masks[placement].over(&level.plane);
             subtract(&mut level.plane, cut);
+            // Light is averaged over twice the widest transition.
+            take_out(&mut level.plane, &Beside { cut, shown, mask: &mask, levels: self.levels.above + 1 });
             Ok(pyramid(level, mask, self.levels.above))
         };
         in_order(self.own.len(), differences, |pyramid: WeightedLevels| {
@@ -129,6 +137,14 @@ impl CoarseBlend<'_> {
         }
         CountedMask { points }
     }
+}
+
+/// A level cut along the seams.
+struct Cut {
+    level: PyramidPlane<[f32; 4]>,
+    /// Every placement's.
+    masks: Vec<CountedMask>,
+    shown: ShownAlone,
 }
 
 /// Where a placement of a photograph is shown: of the points of every sample of its level how many.

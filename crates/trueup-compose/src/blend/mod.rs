@@ -17,6 +17,7 @@ mod region;
 mod shown;
 #[cfg(test)]
 mod tests;
+mod things;
 mod tile;
 mod work;
 
