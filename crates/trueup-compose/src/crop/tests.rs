@@ -182,6 +182,31 @@ fn clouds_are_filled_for_a_tower_to_keep_its_top() {
     assert_eq!((crowns.columns, crowns.rows.start), (0..400, 60));
 }
 
+/// A tower in an even sky bears a mast of a column of pixels, 6 levels darker than the sky, into rows that end beside it: it is kept, and the
+/// sky beside it filled. Without it, and where it runs out of the photograph, they are not.
+#[test]
+fn a_tower_keeps_its_mast() {
+    let layout = layout(500, 130, &[upright(0.0, 30.0, 500.0, 130.0), upright(200.0, 0.0, 300.0, 100.0)]);
+    let scene = |mast: std::ops::Range<usize>| {
+        move |x: usize, y: usize| match (y >= 110, (240..260).contains(&x) && y >= 60, x == 250 && mast.contains(&y)) {
+            (true, _, _) => rough(x, y),
+            (_, true, _) => 60,
+            (_, _, true) => 194,
+            _ => 200,
+        }
+    };
+    let rows = |mast| {
+        let found = kept(&layout, Crop::Auto, scene(mast)).expect("a rectangle");
+        assert_eq!(found.columns, 0..500);
+        found.rows
+    };
+    // Cells are a pixel wide; one row beside what is covered is filled without being asked for.
+    assert!((29..=30).contains(&rows(0..0).start));
+    assert!((29..=30).contains(&rows(0..60).start), "it runs out of the photograph");
+    let with_mast = rows(12..60);
+    assert!(with_mast.start <= 12 && with_mast.end == 130, "{with_mast:?}");
+}
+
 /// Beside an even sky the corner that is missing is filled; where a post runs out of the photograph below, it is not, unless that would keep
 /// too little.
 #[test]
