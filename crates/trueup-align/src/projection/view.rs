@@ -54,6 +54,9 @@ const COLUMN_SIDE: f64 = 0.785;
 const COLUMN_LENGTH: f64 = 1.66;
 const COLUMN_MIDDLE: f64 = 0.349;
 const COLUMN_HEIGHT: f64 = 1.309;
+/// Angles from the horizon, radians (55 and 80 degrees), between which what a column reaches comes to lie so near to a pole that its longitudes say
+/// nothing of the column's middle: a corner 80 degrees up lies six times as far aside as it is wide.
+const NEAR_POLE: [f64; 2] = [0.960, 1.396];
 
 impl ProjectionView {
     /// The view that the options ask for.
@@ -121,7 +124,7 @@ impl ProjectionView {
         let aside = if coverage.shows_a_pole() { 1.0 } else { looked_at };
         let level_middle = coverage.middle + toward_facade(coverage, dominant);
         let straight = level_middle + aside * wrap_angle(coverage.forward_longitude() - level_middle);
-        let looking = |level_pitch: f64| {
+        let looking = |straight: f64, level_pitch: f64| {
             let view = Self {
                 flat: Flat::named(FlatKind::Perspective, 0.0),
                 yaw: wrap_angle(straight + yaw),
@@ -134,14 +137,21 @@ impl ProjectionView {
             let seen = Seen::of(photographs, &view.view_from_level(), half_width);
             (view, seen)
         };
-        let (level_view, level) = looking(0.0);
+        let (level_view, level) = looking(straight, 0.0);
         let [low, high] = level.elevations();
         let middle = 0.5 * (low + high);
         let is_column = high - low > COLUMN_LENGTH
             && (middle.abs() < COLUMN_MIDDLE || level.height() > COLUMN_HEIGHT)
             && level.turned().height() < COLUMN_SIDE;
-        let level_pitch = if is_column { middle } else { steep };
-        let (view, seen) = if level_pitch == 0.0 { (level_view, level) } else { looking(level_pitch) };
+        let (view, seen) = if is_column {
+            // Beside the plane that it is looked at along, what is vertical converges: that plane goes through where its photographs look.
+            let aside = smooth(coverage.steepest(), NEAR_POLE);
+            looking(straight + aside * wrap_angle(coverage.forward_longitude() - straight), middle)
+        } else if steep == 0.0 {
+            (level_view, level)
+        } else {
+            looking(straight, steep)
+        };
         let fitted = |seen: &Seen| {
             let fit = seen.fit();
             (fit, seen.window(&Flat::fitted(fit)))

@@ -2,7 +2,9 @@
 
 use nalgebra::Vector3;
 
+use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_y;
+use trueup_core::mesh::GridMesh;
 
 use super::coverage::tests::photograph;
 use super::fitted::Fit;
@@ -61,6 +63,19 @@ fn one_more_photograph_does_not_flip_the_view() {
         before = now;
     }
     assert!(before.round > 1.8 && before.upright < 0.2, "{before:?}");
+}
+
+/// Up a tower, held upright: the highest of four photographs is turned aside by 6 degrees, and its corners alone are the ends of what is covered.
+#[test]
+fn a_column_is_looked_at_where_its_photographs_look() {
+    let held_upright = |(yaw, pitch)| PosedPhotograph {
+        camera: Camera::new(700.0, 600.0, 800.0, &photograph(yaw, pitch).camera.rotation()),
+        mesh: GridMesh::regular(600.0, 800.0, 20.0),
+    };
+    let column: Vec<PosedPhotograph> = [(0.0, 0.0), (0.0, 20.0), (0.0, 40.0), (6.0, 58.0)].map(held_upright).to_vec();
+    let view = view(&column);
+    // The cosines of the pitches weigh the photographs' directions.
+    assert!(view.flat.fit.turned && (view.yaw.to_degrees() - 0.982).abs() < 0.01, "{view:?}");
 }
 
 /// A strip from straight ahead to the ceiling is one more photograph of a column: horizontals are straight in it.
