@@ -2,7 +2,7 @@
 
 use trueup_core::Result;
 use trueup_core::mask::Masks;
-use trueup_core::source::{PhotographSource, SourceImage};
+use trueup_core::source::SourceImage;
 
 use super::Stitcher;
 use super::light::WantedLight;
@@ -52,7 +52,7 @@ impl Alignment {
         };
         let images: Vec<SourceImage> =
             numbers.iter().map(|&number| self.photographs.sources()[number].clone()).collect();
-        let masks: Vec<Masks> = numbers.iter().map(|&number| self.photographs.masks(number)).collect();
+        let masks: Vec<Masks> = numbers.iter().map(|&number| self.photographs.given_masks(number)).collect();
         let records = self.project.used_images().map(|image| image.masks.clone()).collect();
         let in_memory = self.photographs.in_memory_photographs().clone();
         let masks = AllMasks { masks, records };
