@@ -8,15 +8,23 @@ use trueup_core::mesh::GridMesh;
 
 use crate::vanishing::FULL_WEIGHT_LENGTH_PX;
 
+/// Sine of the angle from straight up or down (20 degrees) within which nothing is seen to stand: plumb lines go all ways there, and a length of
+/// one reaches to the other side.
+const NEAR_PLUMB: f64 = 0.342_020_143_325_668_7;
+
 /// How far plumb lines of a photograph lean clockwise in the panorama, radians in [-pi, pi): the mean over `segments`, the upright ones of
 /// the photograph, in the pixels of `mesh` and `camera`, each weighed by its length as it votes for a direction.
 ///
 /// Not the segments lean, which are found with an error each, but plumb lines in their places and of their lengths, as `down`, the vertical in the
-/// camera's frame, has them. `None` where the panorama shows none of them.
+/// camera's frame (a unit vector), has them. `None` where the panorama shows none of them but straight above and below.
 pub fn drawn_lean(mesh: &GridMesh, camera: &Camera, down: &Vector3<f64>, segments: &[LineSegment]) -> Option<f64> {
     let drawn = |segment: &LineSegment| {
         let middle = Vector2::from(segment.start).lerp(&segment.end.into(), 0.5);
-        let toward = camera.projection_derivatives(camera.bearing(middle))?.by_bearing * down;
+        let bearing = camera.bearing(middle);
+        if bearing.normalize().cross(down).norm() < NEAR_PLUMB {
+            return None;
+        }
+        let toward = camera.projection_derivatives(bearing)?.by_bearing * down;
         let half = toward.try_normalize(f64::MIN_POSITIVE)? * (segment.length() / 2.0);
         let along = mesh.warp(middle + half) - mesh.warp(middle - half);
         // What is not shown is not a number, and a comparison with that is false.
@@ -49,6 +57,18 @@ mod tests {
             vertex[0] -= by(vertex[0]) * vertex[1];
         }
         mesh
+    }
+
+    /// The camera looks 60 degrees down: 10 degrees beside the foot of the plumb line, lines tell nothing.
+    #[test]
+    fn what_lies_straight_below_does_not_stand() {
+        let down = Vector3::new(0.0, 0.5, 0.75_f64.sqrt());
+        let lean = |y: f64| drawn_lean(&sheared(|_| 0.1), &camera(), &down, &[plumb(200.0, y - 10.0, y + 10.0)]);
+        // tan 20 degrees is 0.364.
+        assert_eq!(lean(200.0 + 0.364 * SIDE_PX), None);
+        // At tan 5 degrees, by hand: atan 0.1 to the left below.
+        let upper = lean(200.0 + 0.0875 * SIDE_PX).expect("stands");
+        assert!((upper - 0.1_f64.atan()).abs() < 1e-3, "{upper}");
     }
 
     /// The left half of the photograph stands upright, in the right half what points down is drawn to the left by a tenth. By hand: lines of 60 and 180 px,

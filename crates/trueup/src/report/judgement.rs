@@ -177,6 +177,18 @@ fn leaning(project: &Project, measures: &Measures, place: &impl Fn(&str) -> Opti
         Projection::Auto => "turn it back with --roll",
         _ => "try --projection auto, or --roll with it",
     };
+    /// Degrees up or down from which on a view shows plainly that what is upright in it converges.
+    const CONVERGES: f64 = 10.0;
+    let looks = project.projection.map_or(0.0, |view| view.pitch_deg);
+    let reason = if looks.abs() > CONVERGES {
+        let side = if looks > 0.0 { "up" } else { "down" };
+        format!(
+            "The view looks {side} by {:.0} degrees, where what is upright converges; --projection cylindrical keeps it parallel. If all leans to one side",
+            looks.abs()
+        )
+    } else {
+        "If it does lean".to_owned()
+    };
     Some(Diagnostic::warning(
         LEANING,
         Subject::Photograph(place(&photograph.path)?),
@@ -184,7 +196,7 @@ fn leaning(project: &Project, measures: &Measures, place: &impl Fn(&str) -> Opti
             "what is vertical there leans{side} by {:.DECIMALS$} degrees, up to {within:.DECIMALS$} at 95 %",
             lean.abs()
         ),
-        format!("Look at it there. If it does lean, {ways}."),
+        format!("Look at it there. {reason}, {ways}."),
     ))
 }
 
@@ -313,6 +325,17 @@ mod tests {
         }
         // Of two photographs, none can be left out.
         assert!(!found[1].hint.contains("leave one out"), "{}", found[1].hint);
+    }
+
+    /// Up a tower.
+    #[test]
+    fn where_a_view_looks_up_what_is_upright_converges() {
+        let mut project = project(3.5, 1.0, 1.0);
+        let view = serde_json::json!({"kind": "fitted", "yaw_deg": 0.0, "pitch_deg": 29.7, "roll_deg": 0.0, "panini_distance": 0.0,
+            "px_per_radian": 900.0, "origin": [0.0, 0.0], "sphere": null, "fit": {"round": 0.3, "upright": 1.0, "turned": true}});
+        project.projection = Some(serde_json::from_value(view).expect("a view"));
+        let hint = &warnings(&project, &[])[0].hint;
+        assert!(hint.contains("looks up by 30 degrees") && hint.contains("--projection cylindrical"), "{hint}");
     }
 
     /// A line of 997 px that strays by 31.8, as on the cylinder of a library's hall.
