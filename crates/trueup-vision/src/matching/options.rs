@@ -10,8 +10,8 @@ trueup_core::options! {
         /// different places, or by lenses that bend lines, if pairs that overlap are left out; lower it where wrong pairs
         /// are joined.
         inlier_px: f64 = 5.0, between(0.5, 50.0), "working px";
-        /// Fewest agreeing matches of a joined pair. Lower it for small overlaps with little texture; raise it where
-        /// pairs are joined that do not overlap.
+        /// Fewest agreeing matches of a joined pair. Lower it for small overlaps with little texture, which helps as far as these have few matches: more than 8 and
+        /// three tenths of those in the overlap must agree in any case. Raise it where pairs are joined that do not overlap.
         min_inliers: usize = 15, between(4.0, 10000.0), "matches", basic;
     }
 }
