@@ -3,7 +3,7 @@
 //! Cameras that only turn leave a residual in every overlap where the photographer moved. The solved mesh has aligned
 //! the overlaps as well as it could; which pixel of one photograph meets which pixel of another is read off it, and
 //! both are drawn in the same direction. First photographs step aside as evenly as they can, also where they are alone, so that
-//! lines stay straight ([`smooth_steps`]). What is left is drawn in a mean of the directions in which the photographs then
+//! lines stay straight (`smooth_steps`). What is left is drawn in a mean of the directions in which the photographs then
 //! see the place. Each weighs as deep as the place lies in it, so that nothing jumps where another one ends. The mesh's own
 //! shape, its plane and its drift over long rows are forgotten by this; only what it knows of overlaps remains, so that any
 //! mesh will do, of whatever method.
