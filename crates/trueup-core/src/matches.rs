@@ -81,6 +81,8 @@ pub enum PairVerdict {
     ImplausibleHomography,
     /// Too few of the matches in the predicted overlap agree.
     TooFewInliers,
+    /// Enough matches agree, but little else in the overlap that they predict looks alike: equal things in different places.
+    LooksDifferent,
 }
 
 impl PairVerdict {

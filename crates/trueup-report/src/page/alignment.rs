@@ -57,5 +57,6 @@ fn in_words(verdict: PairVerdict) -> &'static str {
         PairVerdict::TooFewMatches => "too few details look alike",
         PairVerdict::ImplausibleHomography => "they fit together in no possible way",
         PairVerdict::TooFewInliers => "too few of them agree",
+        PairVerdict::LooksDifferent => "what lies between them looks different",
     }
 }

@@ -19,6 +19,7 @@ use super::planes::find_planes;
 use super::putative::PutativeMatch;
 use super::ransac::{Consensus, HomographySearch, NoConsensus, find_homography};
 use super::refined::{Refiner, ScaledMatch};
+use super::resemblance::Resemblance;
 use super::turned::{TurnConsensus, TurnedLens, find_turned_lens};
 use crate::features::Features;
 
@@ -153,7 +154,8 @@ fn better_turn(
 ///
 /// A pair is joined if its homography is believable in the overlap it predicts, and the matches that agree with it are
 /// at least `min_inliers` and more than alpha + beta n_f of the n_f matches in that overlap. Where they are `min_inliers` and not enough, those on
-/// further planes and elsewhere in depth count with them. A forced pair needs only [`MIN_INLIERS_BY_GRAPH`].
+/// further planes and elsewhere in depth count with them. It is not joined where little else in the overlap matches or looks alike
+/// ([`Resemblance`]). A forced pair needs only [`MIN_INLIERS_BY_GRAPH`].
 ///
 /// # Errors
 /// [`Error::Options`]; [`Error::Input`] if the photographs are the same or features contradict themselves;
@@ -163,7 +165,7 @@ fn better_turn(
 /// The test: Brown and Lowe, Automatic panoramic image stitching using invariant features, section 3.2.
 ///
 /// # Departures
-/// Brown and Lowe count what agrees with one homography, since their cameras turn about one point.
+/// Brown and Lowe count what agrees with one homography, since their cameras turn about one point, and join whatever passes: equal bays of a hall do, too.
 pub(super) fn match_pair(
     input: &PairInput<'_>,
     options: &MatchingOptions,
@@ -230,6 +232,13 @@ pub(super) fn match_pair(
         if is_promising {
             pair.agreeing = explained.all.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
             input.judge(&mut pair, options);
+        }
+        // Who names a pair in a graph knows better.
+        if pair.verdict == PairVerdict::Joined && !forced {
+            let resemblance = Resemblance { a: a.features, b: b.features, overlap: &overlap };
+            if resemblance.is_missing(pair.in_overlap) {
+                pair.verdict = PairVerdict::LooksDifferent;
+            }
         }
         if pair.verdict.is_joined() {
             pair.inliers = explained.inliers.into();

@@ -103,7 +103,10 @@ impl Refiner<'_> {
 }
 
 /// How a map stretches and turns around a point.
-fn derivative(point: Vector2<f64>, map: &impl Fn(Vector2<f64>) -> Option<Vector2<f64>>) -> Option<Matrix2<f64>> {
+pub(super) fn derivative(
+    point: Vector2<f64>,
+    map: &impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
+) -> Option<Matrix2<f64>> {
     let [left, right, above, below] =
         [[-0.5, 0.0], [0.5, 0.0], [0.0, -0.5], [0.0, 0.5]].map(|[x, y]| map(point + Vector2::new(x, y)));
     Some(Matrix2::from_columns(&[right? - left?, below? - above?]))

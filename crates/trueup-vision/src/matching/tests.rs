@@ -448,3 +448,30 @@ fn contradictory_input_is_an_error() {
     let missing = run(&input, &MatchingOptions::default(), &context);
     assert!(matches!(missing, Err(Error::Input { .. })));
 }
+
+/// 40 matches agree with one map, as those of equal things do; each photograph shows 800 features more, which are told by what surrounds them.
+#[test]
+fn photographs_of_equal_things_among_others_are_not_joined() {
+    let back = Homography(example_map().0.try_inverse().expect("regular"));
+    let verdict = |scene_from_b: &dyn Fn(Vector2<f64>) -> Vector2<f64>, is_forced: bool| {
+        let mut generator = generator(20);
+        let mut photographs = PhotographPair::default();
+        photographs.add_plane(&example_map(), 40, 0.3, &mut generator);
+        for features in [&mut photographs.a, &mut photographs.b] {
+            for k in 0..825 {
+                let place = Vector2::new(f64::from(k % 33), f64::from(k / 33)) * 24.0;
+                push(features, place + Vector2::new(15.0, 14.0), &[random_descriptor(&mut generator)]);
+            }
+        }
+        photographs.a.surroundings = waves(&|place| place);
+        photographs.b.surroundings = waves(scene_from_b);
+        let pair = photographs.matched(is_forced, &MatchingOptions::default());
+        assert_eq!(pair.inliers.is_empty(), !pair.verdict.is_joined());
+        (pair.verdict, pair.agreeing >= pair.needed)
+    };
+    let elsewhere = |place: Vector2<f64>| Vector2::new(1.4 * place.y, 1.3 * place.x);
+    assert_eq!(verdict(&|place| back.apply(place), false), (PairVerdict::Joined, true));
+    assert_eq!(verdict(&elsewhere, false), (PairVerdict::LooksDifferent, true));
+    // Who names the pair in a graph knows better.
+    assert_eq!(verdict(&elsewhere, true), (PairVerdict::Joined, true));
+}

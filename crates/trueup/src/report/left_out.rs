@@ -91,6 +91,9 @@ pub(crate) fn counts(pair: &PairMatches) -> String {
         PairVerdict::ImplausibleHomography => {
             format!("{} of {} matches agree, but on an impossible view", pair.agreeing, pair.putative)
         }
+        PairVerdict::LooksDifferent => {
+            format!("{} of {} matches agree, but what lies between them looks different", pair.agreeing, pair.putative)
+        }
         _ => format!("{} of {} matches agree ({} needed)", pair.agreeing, pair.putative, pair.needed),
     }
 }
@@ -104,6 +107,9 @@ fn hint(pair: &PairMatches) -> &'static str {
     match pair.verdict {
         PairVerdict::ImplausibleHomography => {
             "Repeated patterns mislead matching; shoot with more overlap, or join the pair in a --graph file."
+        }
+        PairVerdict::LooksDifferent => {
+            "Equal things in different places mislead matching; shoot one frame between them, or join the pair in a --graph file if they do overlap."
         }
         _ => "Shoot one frame between them, or join the pair in a --graph file if they do overlap.",
     }
