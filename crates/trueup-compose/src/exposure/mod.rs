@@ -15,6 +15,7 @@ mod overlap;
 mod predicted;
 mod robust;
 mod samples;
+mod shoulder;
 mod solution;
 mod solve;
 

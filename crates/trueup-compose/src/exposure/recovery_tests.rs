@@ -229,3 +229,30 @@ fn photographs_of_one_exposure_say_nothing_of_the_response() {
     let found = found(&lights, film, 3, &ExposureOptions::default());
     assert!(found.response.is_plain(), "{:?}", found.response);
 }
+
+/// Three exposures tell a camera that clips hard from one that levels highlights off; one exposure tells nothing.
+#[test]
+fn a_shoulder_is_told_from_hard_clipping() {
+    let of = |exposures: [f64; PLACES.len()]| exposures.map(|gain| Light { gain: [gain; 3], vignetting: [0.0; 3] });
+    let three = of([1.0, 0.5, 2.0, 0.5, 2.0, 1.0]);
+    let hard = |light: f64| TransferCurve::SRGB.encoded(light);
+    // Of two exposures a factor f apart, y and f y / (1 + s (f^4 - 1) y^4)^(1/4) are the same light, with s = k / (1 + k).
+    let levelled = |k: f64| {
+        move |light: f64| TransferCurve::SRGB.encoded(light * ((1.0 + k) / (1.0 + k * light.powi(4))).powf(0.25))
+    };
+    let options = ExposureOptions { response: false, ..ExposureOptions::default() };
+    for seed in 0..3 {
+        let shoulder = |lights: &[Light], encoded: &dyn Fn(f64) -> f64, options: &ExposureOptions| {
+            let found = found(lights, encoded, seed, options).photographs;
+            assert!(found.iter().all(|one| one.shoulder == found[0].shoulder), "{found:?}");
+            found[0].shoulder
+        };
+        let found = [shoulder(&three, &hard, &options), shoulder(&three, &hard, &ExposureOptions::default())];
+        assert!(found.iter().all(|&found| found < 0.1), "{seed}: {found:?}");
+        // Half a shoulder, and 0.9 of one; what is expected of none is a whole.
+        let found = [shoulder(&three, &levelled(1.0), &options), shoulder(&three, &levelled(9.0), &options)];
+        assert!((found[0] - 0.5).abs() < 0.15 && (found[1] - 0.9).abs() < 0.15, "{seed}: {found:?}");
+        let found = shoulder(&of([1.0; PLACES.len()]), &hard, &options);
+        assert!(found > 0.9, "{seed}: {found}");
+    }
+}

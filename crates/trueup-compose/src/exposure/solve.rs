@@ -76,7 +76,11 @@ pub(super) fn solve(input: &SolveInput<'_>, options: &ExposureOptions, context: 
     if !makes_curve || (!corrections.response.is_plain() && limited) {
         return without_response(input, options, context);
     }
-    Ok(corrections)
+    let shoulder = input.thumbnails.first().map(|one| problem.shoulder(&weights, &solution, one.curve));
+    Ok(match shoulder {
+        Some(shoulder) => corrections.with_shoulder(shoulder),
+        None => corrections,
+    })
 }
 
 /// The same with the profile's curve as it is: what falls back on where a response that was found is of no use.

@@ -18,6 +18,15 @@ pub struct Correction {
     /// Coefficients of r^2, r^4 and r^6 in the natural logarithm of a further factor on all channels; r is the distance
     /// from the photograph's middle, 1 in its corners.
     pub vignetting: [f64; VIGNETTING_TERMS],
+    /// How far the camera levels highlights off towards white, beside the response: 0 where it clips hard, 1 where darkening undoes all
+    /// that brightening does.
+    #[serde(default = "whole_shoulder")]
+    pub shoulder: f64,
+}
+
+/// Of what nothing is known, such as files of programs that knew no other: most cameras have a shoulder.
+fn whole_shoulder() -> f64 {
+    1.0
 }
 
 impl Default for Correction {
@@ -30,7 +39,7 @@ impl Default for Correction {
 impl Correction {
     /// One factor on all channels everywhere.
     pub fn uniform(gain: f64) -> Self {
-        Self { gain: [gain; 3], vignetting: [0.0; VIGNETTING_TERMS] }
+        Self { gain: [gain; 3], vignetting: [0.0; VIGNETTING_TERMS], shoulder: whole_shoulder() }
     }
 
     /// The geometric mean of the channels' gains: the factor on brightness in the photograph's middle.
@@ -63,13 +72,14 @@ impl Correction {
     pub fn check(&self) -> Result<()> {
         let usable = |factor: f64| factor.is_finite() && factor > 0.0;
         // Beyond the corner by a rim's width; exp overflows long after any lens.
-        if self.gain.into_iter().all(usable) && usable(self.at_radius(1.0)) {
+        let is_share = (0.0..=1.0).contains(&self.shoulder);
+        if self.gain.into_iter().all(usable) && usable(self.at_radius(1.0)) && is_share {
             return Ok(());
         }
         Err(Error::input(
             "gains",
             format!("{self:?} is not a positive factor on light"),
-            "Give finite gains above zero for each photograph.",
+            "Give finite gains above zero, and a shoulder from 0 to 1, for each photograph.",
         ))
     }
 }
@@ -88,6 +98,12 @@ impl Corrections {
     /// Leaves `count` photographs as they are.
     pub fn plain(count: usize) -> Self {
         vec![Correction::default(); count].into()
+    }
+
+    /// With highlights that the cameras of all level off by this share.
+    pub(crate) fn with_shoulder(mut self, shoulder: f64) -> Self {
+        self.photographs.iter_mut().for_each(|one| one.shoulder = shoulder);
+        self
     }
 
     /// Those of what is placed in `layout`, if `index_of` tells a photograph's place in these. A photograph may be placed
@@ -114,6 +130,8 @@ mod tests {
         assert!(Correction::uniform(0.0).check().is_err());
         assert!(Correction::uniform(f64::NAN).check().is_err());
         assert!(Correction { vignetting: [1e6, 0.0, 0.0], ..Correction::default() }.check().is_err());
+        assert!(Correction { shoulder: 1.1, ..Correction::default() }.check().is_err());
+        assert!(Correction { shoulder: f64::NAN, ..Correction::default() }.check().is_err());
         assert!(Correction::default().check().is_ok());
     }
 }

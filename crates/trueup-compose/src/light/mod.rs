@@ -11,5 +11,5 @@ pub use correction::{Correction, Corrections, VIGNETTING_TERMS};
 pub(crate) use local_exposure::{ExposureMap, LocalExposure};
 pub use response::{RESPONSE_TERMS, Response};
 #[cfg(target_arch = "x86_64")]
-pub(crate) use table::LEAST_LEVELLED;
-pub(crate) use table::{LightTable, PhotographLight, exposed};
+pub(crate) use table::{LEAST_DIVISOR, NEAR_WHITE, WARMEST, WHITENED};
+pub(crate) use table::{LEAST_WHITE, LightTable, PhotographLight, exposed, shown};

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::positions::Positions;
-use crate::light::{LightTable, exposed};
+use crate::light::{LightTable, shown};
 use crate::weights::{Feather, Weighting, weight};
 
 /// What one photograph brings to [`accumulate`].
@@ -139,17 +139,22 @@ fn corrected(light: &LightTable, samples: &[[f32; 4]], lifts: &[f32; BLOCK]) -> 
     for (at, &[r, g, b, _]) in samples.iter().enumerate().take(BLOCK) {
         (levels[0][at], levels[1][at], levels[2][at]) = (r, g, b);
     }
-    for (channel, gain) in levels.iter_mut().zip(light.gain) {
+    for channel in &mut levels {
         *channel = light.linearize.linear_all(*channel);
-        if light.keeps_light {
+    }
+    if light.keeps_light {
+        for (channel, gain) in levels.iter_mut().zip(light.gain) {
             for (value, lift) in channel.iter_mut().zip(lifts) {
                 *value *= gain * lift;
             }
-            continue;
         }
-        for (value, lift) in channel.iter_mut().zip(lifts) {
-            *value = exposed(*value, gain * lift);
-        }
+        return levels;
+    }
+    let [gain_r, gain_g, gain_b] = light.gain;
+    for (at, lift) in lifts.iter().enumerate() {
+        let linear = [levels[0][at], levels[1][at], levels[2][at]];
+        [levels[0][at], levels[1][at], levels[2][at]] =
+            shown(linear, [gain_r * lift, gain_g * lift, gain_b * lift], light.shoulder);
     }
     levels
 }
@@ -186,16 +191,16 @@ fn center(positions: &Positions, index: usize) -> [f32; 2] {
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use std::arch::x86_64::{
-        __m256, _mm_loadu_ps, _mm_storeu_ps, _mm256_add_ps, _mm256_castps_si256, _mm256_castps128_ps256,
-        _mm256_castps256_ps128, _mm256_cvtepi32_ps, _mm256_div_ps, _mm256_extractf128_ps, _mm256_insertf128_ps,
-        _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps, _mm256_min_ps, _mm256_mul_ps, _mm256_set1_ps,
-        _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_storeu_si256, _mm256_sub_ps, _mm256_unpackhi_ps,
-        _mm256_unpacklo_ps,
+        __m256, _CMP_LT_OQ, _mm_loadu_ps, _mm_storeu_ps, _mm256_add_ps, _mm256_castps_si256, _mm256_castps128_ps256,
+        _mm256_castps256_ps128, _mm256_cmp_ps, _mm256_cvtepi32_ps, _mm256_div_ps, _mm256_extractf128_ps,
+        _mm256_insertf128_ps, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps,
+        _mm256_mul_ps, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_storeu_si256,
+        _mm256_sub_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
     };
     use std::ops::Range;
 
     use super::{Contribution, Development, Positions};
-    use crate::light::{LEAST_LEVELLED, LightTable};
+    use crate::light::{LEAST_DIVISOR, LEAST_WHITE, LightTable, NEAR_WHITE, WARMEST, WHITENED};
     use crate::linear_table::{LinearTable, ROUNDING};
 
     #[target_feature(enable = "avx2")]
@@ -227,16 +232,14 @@ mod x86 {
                 lifts = _mm256_mul_ps(lifts, unsafe { _mm256_loadu_ps(factors.as_ptr()) });
             }
             let [r, g, b, opacity] = by_channel(eight);
-            let root = |level: __m256, gain: f32| {
-                let linear = linear(light, level);
-                let factor = _mm256_mul_ps(_mm256_set1_ps(gain), lifts);
-                if light.keeps_light {
-                    _mm256_sqrt_ps(_mm256_sqrt_ps(_mm256_mul_ps(linear, factor)))
-                } else {
-                    _mm256_sqrt_ps(exposed_all(linear, factor))
-                }
+            let linear = [r, g, b].map(|level| linear(light, level));
+            let factors = light.gain.map(|gain| _mm256_mul_ps(_mm256_set1_ps(gain), lifts));
+            let roots = if light.keeps_light {
+                let root = |at: usize| _mm256_sqrt_ps(_mm256_sqrt_ps(_mm256_mul_ps(linear[at], factors[at])));
+                [root(0), root(1), root(2)]
+            } else {
+                shown_all(linear, factors, light.shoulder).map(|light| _mm256_sqrt_ps(light))
             };
-            let roots = [root(r, light.gain[0]), root(g, light.gain[1]), root(b, light.gain[2])];
             let share = _mm256_mul_ps(opacity, _mm256_set1_ps(super::SHARE_PER_LEVEL));
             let share = _mm256_min_ps(_mm256_max_ps(share, _mm256_setzero_ps()), _mm256_set1_ps(1.0));
             by_pixel([roots[0], roots[1], roots[2], share], eight);
@@ -254,9 +257,57 @@ mod x86 {
     fn exposed_all(linear: __m256, factor: __m256) -> __m256 {
         let square = |value| _mm256_mul_ps(value, value);
         let one = _mm256_set1_ps(1.0);
-        let strength = _mm256_sub_ps(square(square(_mm256_max_ps(factor, _mm256_set1_ps(LEAST_LEVELLED)))), one);
+        let strength = _mm256_sub_ps(square(square(_mm256_max_ps(factor, one))), one);
         let levelled = _mm256_add_ps(one, _mm256_mul_ps(strength, square(square(linear))));
         _mm256_div_ps(_mm256_mul_ps(factor, linear), _mm256_sqrt_ps(_mm256_sqrt_ps(levelled)))
+    }
+
+    /// [`shown`](crate::light::shown), the same operations in the same order.
+    #[target_feature(enable = "avx2")]
+    fn shown_all([red, green, blue]: [__m256; 3], factors: [__m256; 3], shoulder: f32) -> [__m256; 3] {
+        let all = |value: f32| _mm256_set1_ps(value);
+        let square = |value| _mm256_mul_ps(value, value);
+        let (zero, one) = (_mm256_setzero_ps(), all(1.0));
+        let least = factors.into_iter().fold(one, |least, factor| _mm256_min_ps(least, factor));
+        if _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(least, one)) == 0 {
+            // Nothing is darkened: all else changes nothing.
+            return [exposed_all(red, factors[0]), exposed_all(green, factors[1]), exposed_all(blue, factors[2])];
+        }
+        let smooth = |share| {
+            let share = _mm256_min_ps(_mm256_max_ps(share, zero), one);
+            let steep = _mm256_sub_ps(all(3.0), _mm256_mul_ps(all(2.0), share));
+            _mm256_mul_ps(_mm256_mul_ps(share, share), steep)
+        };
+        let [from, to] = WHITENED;
+        let mean = _mm256_mul_ps(_mm256_add_ps(_mm256_add_ps(red, green), blue), all(1.0 / 3.0));
+        let beyond = _mm256_mul_ps(_mm256_sub_ps(mean, all(from)), all(1.0 / (to - from)));
+        let white = smooth(beyond);
+        let ratio = |third| _mm256_div_ps(green, _mm256_max_ps(third, all(LEAST_DIVISOR)));
+        let root = |ratio| _mm256_sqrt_ps(_mm256_max_ps(ratio, one));
+        let blue_of = _mm256_mul_ps(green, root(ratio(red)));
+        let red_of = _mm256_mul_ps(green, root(_mm256_min_ps(ratio(blue), all(WARMEST))));
+        let near =
+            |linear| smooth(_mm256_mul_ps(_mm256_sub_ps(linear, all(NEAR_WHITE)), all(1.0 / (1.0 - NEAR_WHITE))));
+        let developed = |linear, continued, factor| {
+            let darkening = _mm256_min_ps(_mm256_max_ps(factor, all(LEAST_WHITE)), one);
+            let most = _mm256_div_ps(linear, darkening);
+            let missing = _mm256_max_ps(_mm256_sub_ps(_mm256_min_ps(continued, most), linear), zero);
+            let strength = _mm256_sub_ps(square(square(darkening)), one);
+            let spread = _mm256_add_ps(one, _mm256_mul_ps(strength, square(square(linear))));
+            let spread = _mm256_div_ps(one, _mm256_sqrt_ps(_mm256_sqrt_ps(spread)));
+            let to_white = _mm256_sub_ps(_mm256_div_ps(one, darkening), one);
+            let together = _mm256_add_ps(one, _mm256_mul_ps(white, to_white));
+            let lift = _mm256_add_ps(together, _mm256_mul_ps(all(shoulder), _mm256_sub_ps(spread, together)));
+            let light = exposed_all(_mm256_add_ps(linear, _mm256_mul_ps(near(linear), missing)), factor);
+            _mm256_min_ps(_mm256_mul_ps(light, lift), _mm256_div_ps(factor, darkening))
+        };
+        let shown_red = developed(red, red_of, factors[0]);
+        let shown_green = developed(green, zero, factors[1]);
+        let shown_blue = developed(blue, blue_of, factors[2]);
+        let between = _mm256_sqrt_ps(_mm256_mul_ps(shown_red, _mm256_max_ps(shown_red, shown_blue)));
+        let bounded = _mm256_min_ps(shown_green, _mm256_max_ps(between, _mm256_mul_ps(factors[1], green)));
+        let change = _mm256_mul_ps(near(green), _mm256_sub_ps(bounded, shown_green));
+        [shown_red, _mm256_add_ps(shown_green, change), shown_blue]
     }
 
     /// Linear light of samples on the scale of 0 to 255.
@@ -345,5 +396,41 @@ mod x86 {
             _mm256_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high),
             _mm256_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high),
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::color::TransferCurve;
+
+    use super::*;
+    use crate::light::{Correction, PhotographLight};
+
+    /// With vector instructions and without, to the last bit: dark, bright and clipped colors, darkened and brightened, with a shoulder, half of
+    /// one and none.
+    #[test]
+    fn every_processor_shows_the_same_light() {
+        let levels = [0.0, 90.5, 214.0, 236.25, 243.0, 250.0, 254.6, 255.0];
+        let level = |at: usize| levels[at % levels.len()];
+        let samples: Vec<[f32; 4]> = (0..512).map(|at| [level(at), level(at / 8), level(at / 64), 255.0]).collect();
+        let mut positions = Positions::default();
+        positions.resize(samples.len());
+        (0..samples.len()).for_each(|at| positions.column[at] = at as i32 % 400);
+        let feather = Feather::new([400.0, 300.0], 1.0);
+        for shoulder in [0.0, 0.5, 1.0] {
+            for gain in [[0.3, 0.31, 0.29], [0.7, 0.75, 0.72], [0.98, 1.0, 1.03], [1.4, 1.5, 1.6]] {
+                let correction = Correction { gain, vignetting: [0.2, 0.0, 0.1], shoulder };
+                let light = PhotographLight { curve: &TransferCurve::SRGB, correction: &correction, local: None };
+                let light = LightTable::new(light, [400.0, 300.0]);
+                let development = Development { feather: &feather, light: &light, local: None, border_footprint: None };
+                let (mut here, mut portable) = (samples.clone(), samples.clone());
+                develop(development, &positions, &mut here);
+                develop_portable(development, &positions, &mut portable);
+                let bits = |samples: &[[f32; 4]]| {
+                    samples.as_flattened().iter().map(|value| value.to_bits()).collect::<Vec<_>>()
+                };
+                assert_eq!(bits(&here), bits(&portable), "{correction:?}");
+            }
+        }
     }
 }

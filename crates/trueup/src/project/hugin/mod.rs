@@ -356,7 +356,7 @@ mod tests {
 
     #[test]
     fn vignetting_is_the_inverse_polynomial() {
-        let correction = Correction { gain: [1.0; 3], vignetting: [0.3, -0.1, 0.05] };
+        let correction = Correction { gain: [1.0; 3], vignetting: [0.3, -0.1, 0.05], ..Correction::default() };
         let [b, c, d] = vignetting(&correction);
         for r2 in [0.1_f64, 0.5, 1.0] {
             let dims = 1.0 + b * r2 + c * r2 * r2 + d * r2 * r2 * r2;
