@@ -40,7 +40,7 @@ pub(crate) struct Cell {
 }
 
 /// The grid of one photograph, ready to be asked row by row.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct DeformedGrid {
     /// Row-major; where cells overlap (folds) the later one covers.
     pub(crate) cells: Vec<Cell>,

@@ -130,6 +130,20 @@ impl<'a> WarpedPhotograph<'a> {
         Self { ignored, ..self }
     }
 
+    /// The same with highlights spread as by a camera that levels them off all the way: without, bright things turn white together and could not be
+    /// told apart any more.
+    pub(crate) fn with_spread_highlights(&self) -> WarpedPhotograph<'_> {
+        WarpedPhotograph {
+            photograph: Cow::Borrowed(&self.photograph),
+            grid: self.grid.clone(),
+            feather: self.feather.clone(),
+            light: self.light.clone().with_whole_shoulder(),
+            local: self.local.clone(),
+            ignored: self.ignored.clone(),
+            is_fitted: self.is_fitted,
+        }
+    }
+
     /// The grid, in the pixels of [`Self::photograph`].
     pub(crate) fn grid(&self) -> &DeformedGrid {
         &self.grid

@@ -34,7 +34,7 @@ pub(crate) const FEATHER_EXPONENT: f64 = 3.0;
 /// # Departures
 /// The published weight is `min(x + 1, W - x) min(y + 1, H - y)` of whole pixels, whose slope jumps at the middle and at
 /// the border; the smooth step has no such lines to be seen.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Feather {
     /// Profile at the centers of the columns -1 to W.
     x: Vec<f32>,

@@ -120,6 +120,11 @@ const STEPS: usize = 256;
 pub(crate) const ENTRIES: usize = 512;
 
 impl LightTable {
+    /// The same with highlights that the camera levels off all the way, whether it does or not.
+    pub(crate) fn with_whole_shoulder(self) -> Self {
+        Self { shoulder: 1.0, ..self }
+    }
+
     /// For a photograph of `size` pixels.
     pub(crate) fn new(light: PhotographLight<'_>, size: [f64; 2]) -> Self {
         let PhotographLight { curve, correction, .. } = light;

@@ -278,7 +278,7 @@ impl Making<'_> {
         let masks = photographs.masks(placed.photograph);
         let view = || match layout.placed.len() {
             1 => SmallView::default(),
-            _ => small_view(&warped, &masks, period, self.input.view_levels),
+            _ => small_view(&warped.with_spread_highlights(), &masks, period, self.input.view_levels),
         };
         let local_unrolled = local.map(|local| local.led_by(unrolled.lead()));
         let light = PhotographLight { local: local_unrolled.as_ref(), ..light };
