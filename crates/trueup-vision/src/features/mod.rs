@@ -1,8 +1,9 @@
 //! Scale-invariant features (SIFT).
 //!
 //! The steps of [`detect`] are one file each: the Gaussian scale space, the extrema of its differences, their
-//! orientations and their descriptors. `feature` holds what they find.
+//! orientations and their descriptors. `feature` holds what they find, `coarse` finds them at half the size.
 
+mod coarse;
 mod descriptor;
 mod extrema;
 mod feature;
@@ -23,6 +24,7 @@ use trueup_core::options::StageOptions;
 use trueup_core::raster::Raster;
 use trueup_core::{Error, Result, StageContext};
 
+pub use coarse::detect_coarse;
 use extrema::Extremum;
 pub use feature::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint, Features};
 pub use options::FeatureOptions;

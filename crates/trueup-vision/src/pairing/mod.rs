@@ -2,9 +2,10 @@
 //!
 //! All pairs of few photographs. Of many, first those whose features are each other's neighbors among those of all photographs
 //! (`likeness`, `forest`), and consecutive ones; then those that the homographies of verified pairs predict to overlap (`growth`); at
-//! last, what might join photographs that are still apart (`groups`). The number of pairs grows with that of the photographs, not with its
+//! last, what might join photographs that are still apart (`groups`). Those that stay apart are looked at again (`apart`). The number of pairs grows with that of the photographs, not with its
 //! square.
 
+mod apart;
 mod forest;
 mod groups;
 mod growth;
@@ -23,6 +24,7 @@ use crate::features::FeatureSource;
 use groups::Groups;
 use growth::VerifiedOverlaps;
 
+pub use apart::{Apart, pairs_apart};
 pub use likeness::{Likeness, likeness};
 
 /// Overlaps of a photograph, in multiples of `pairing.neighbors`, from which no more are looked for: they tell nothing new.
