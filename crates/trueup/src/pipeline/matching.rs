@@ -1,25 +1,33 @@
-//! The match phase: from features to matched pairs and their graph, as far as they are not known from earlier runs.
+//! The match phase: from features to matched pairs and their graph, as far as they are not known from earlier runs. Photographs that are left over are
+//! looked at again, by what is coarse in them.
 
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 
+use rayon::prelude::*;
 use trueup_align::stitch_graph::StitchGraph;
-use trueup_core::diagnostics::Reported;
+use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
 use trueup_core::matches::PairMatches;
 use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::told_lens::ToldLens;
 use trueup_core::{Result, StageContext};
 use trueup_vision::features::FeatureSource;
 use trueup_vision::matching::{self, Stranger, StrangersInput};
-use trueup_vision::pairing::{Likeness, Proposals, likeness};
+use trueup_vision::pairing::{Apart, Likeness, Proposals, likeness, pairs_apart};
 
 use crate::memo::{Key, KeyMaker, LIKENESS, Memo, PAIR};
 use crate::options::MatchOptions;
 use crate::workers::Division;
 
-/// What the phase works on. Photographs are counted 0..N; `features`, `frames`, `told`, `usable`, `images` and `keys` have N entries.
+/// The code of photographs that are joined to others only by what is coarse.
+pub(crate) const JOINED_BY_COARSE: &str = "joined-by-coarse-features";
+
+/// What the phase works on. Photographs are counted 0..N; `features`, `coarse`, `frames`, `told`, `usable`, `images` and `keys` have N entries.
 #[derive(Debug)]
 pub(crate) struct MatchInput<'a> {
     pub features: &'a dyn FeatureSource,
+    /// What is coarse in them, asked for where photographs are left over.
+    pub coarse: &'a dyn FeatureSource,
     pub frames: &'a [WorkingFrame],
     /// What the user told of each lens.
     pub told: &'a [ToldLens],
@@ -52,22 +60,115 @@ pub(crate) struct Matches {
     pub graph: StitchGraph,
 }
 
-/// Matches the pairs of photographs that are worth it, or those wished for.
+/// Which of the photographs' features are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Look {
+    /// The strongest of all sizes.
+    First,
+    /// Coarse ones.
+    Coarse,
+}
+
+impl Look {
+    /// The features that are compared.
+    fn features<'a>(self, input: &MatchInput<'a>) -> &'a dyn FeatureSource {
+        match self {
+            Self::First => input.features,
+            Self::Coarse => input.coarse,
+        }
+    }
+
+    /// What is found by this look, beside what else decides it.
+    fn key(self, maker: KeyMaker) -> KeyMaker {
+        match self {
+            Self::First => maker,
+            Self::Coarse => maker.part("coarse"),
+        }
+    }
+}
+
+/// Matches the pairs of photographs that are worth it, or those wished for; where photographs are left over, those once more by what is coarse.
 ///
 /// # Errors
 /// Those of [`likeness`], [`Proposals::new`] and [`matching::run`].
 pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Reported<Matches>> {
     context.gather(|context| {
         let pairs = context.time("matching", || match_pairs(input, options, context))?;
-        let strangers = if input.wished.is_empty() { strangers(input, &pairs) } else { Vec::new() };
-        let is_stranger = |photograph| strangers.iter().any(|stranger| stranger.photograph == photograph);
-        let known = || pairs.iter().filter(|pair| !is_stranger(pair.a) && !is_stranger(pair.b));
+        let matches = context.time("matching", || look_again(input, judged(input, pairs), options, context))?;
+        let is_stranger = |photograph| is_stranger(&matches.strangers, photograph);
+        let known = matches.pairs.iter().filter(|pair| !is_stranger(pair.a) && !is_stranger(pair.b));
         // A marked photograph is meant to stand for itself beside others of its view.
         let unmarked = |pair: &&PairMatches| [pair.a, pair.b].iter().all(|&one| !input.marked[one]);
-        matching::report_near_duplicates(known().filter(unmarked), context);
-        let graph = StitchGraph::new(input.features.photographs(), known());
-        Ok(Matches { pairs, strangers, graph })
+        matching::report_near_duplicates(known.filter(unmarked), context);
+        Ok(matches)
     })
+}
+
+/// What pairs come to: which photographs are none of the scene, and which of the others are joined.
+fn judged(input: &MatchInput, pairs: Vec<PairMatches>) -> Matches {
+    let strangers = if input.wished.is_empty() { strangers(input, &pairs) } else { Vec::new() };
+    let known = pairs.iter().filter(|pair| !is_stranger(&strangers, pair.a) && !is_stranger(&strangers, pair.b));
+    let graph = StitchGraph::new(input.features.photographs(), known);
+    Matches { pairs, strangers, graph }
+}
+
+fn is_stranger(strangers: &[Stranger], photograph: usize) -> bool {
+    strangers.iter().any(|stranger| stranger.photograph == photograph)
+}
+
+/// Looks at the pairs that are apart by what is coarse, and joins those that overlap by that; a pair that does not keeps its verdict. Where nothing is
+/// left over, nothing is looked at.
+fn look_again(input: &MatchInput, first: Matches, options: &MatchOptions, context: &StageContext) -> Result<Matches> {
+    let alone = |matches: &Matches| -> BTreeSet<usize> {
+        matches.graph.components.iter().filter(|group| group.len() == 1).flatten().copied().collect()
+    };
+    let (were_alone, mut matches, mut tried) = (alone(&first), first, BTreeSet::new());
+    let known = OnceCell::new();
+    let looks = || match known.get() {
+        Some(likeness) => Ok(likeness),
+        None => known_likeness(input, Look::Coarse, options, context).map(|likeness| known.get_or_init(|| likeness)),
+    };
+    loop {
+        let is_usable = |one: usize| input.usable[one] && !is_stranger(&matches.strangers, one);
+        let usable: Vec<bool> = (0..input.usable.len()).map(is_usable).collect();
+        let groups = &matches.graph.components;
+        let apart = Apart { groups, usable: &usable, wished: input.wished, tried: &tried };
+        let candidates = pairs_apart(&apart, &options.pairing, looks)?;
+        if candidates.is_empty() {
+            break;
+        }
+        let mut found = match_candidates(input, &candidates, Look::Coarse, options, context)?;
+        found.retain(|pair| pair.verdict.is_joined());
+        if found.is_empty() {
+            break;
+        }
+        tried.extend(candidates);
+        let pairs = replaced(matches.pairs, found, !input.wished.is_empty());
+        matches = judged(input, pairs);
+    }
+    for &photograph in were_alone.difference(&alone(&matches)) {
+        context.report(Diagnostic::note(
+            JOINED_BY_COARSE,
+            Subject::Photograph(photograph),
+            "it shares with others only what is coarse, as a blurred photograph does",
+            "Leave it out if the panorama is not sharp there and others show the same.",
+        ));
+    }
+    Ok(matches)
+}
+
+/// The pairs with those `found` in the place of their own first look; in the order of photographs, unless they are `wished` for in their own.
+fn replaced(mut pairs: Vec<PairMatches>, found: Vec<PairMatches>, wished: bool) -> Vec<PairMatches> {
+    for pair in found {
+        match pairs.iter_mut().find(|known| (known.a, known.b) == (pair.a, pair.b)) {
+            Some(known) => *known = pair,
+            None => pairs.push(pair),
+        }
+    }
+    if !wished {
+        pairs.sort_by_key(|pair| (pair.a, pair.b));
+    }
+    pairs
 }
 
 /// The pictures that pairs and files show to be no photographs of the scene.
@@ -81,14 +182,14 @@ fn strangers(input: &MatchInput, pairs: &[PairMatches]) -> Vec<Stranger> {
 /// Every pair tried: those wished for in their order, or those proposed, ascending.
 fn match_pairs(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Vec<PairMatches>> {
     if !input.wished.is_empty() {
-        return match_candidates(input, input.wished, options, context);
+        return match_candidates(input, input.wished, Look::First, options, context);
     }
-    let looks = || known_likeness(input, options, context);
+    let looks = || known_likeness(input, Look::First, options, context);
     let mut proposals = Proposals::new(input.features, input.frames, &options.pairing, looks)?;
     let mut all: Vec<PairMatches> = Vec::new();
     let mut candidates = proposals.next(&[]);
     while !candidates.is_empty() {
-        let matched = match_candidates(input, &candidates, options, context)?;
+        let matched = match_candidates(input, &candidates, Look::First, options, context)?;
         candidates = proposals.next(&matched);
         all.extend(matched);
     }
@@ -97,16 +198,17 @@ fn match_pairs(input: &MatchInput, options: &MatchOptions, context: &StageContex
 }
 
 /// How the photographs look like each other, kept for the same ones in the same order.
-fn known_likeness(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Likeness> {
+fn known_likeness(input: &MatchInput, look: Look, options: &MatchOptions, context: &StageContext) -> Result<Likeness> {
     let content = input.keys.iter().try_fold(KeyMaker::new(), |maker, key| Some(maker.key(key.as_ref()?)));
-    let key = input.memo.key(LIKENESS, content, options);
-    input.memo.found_or_made(LIKENESS, key.as_ref(), |_| true, || likeness(input.features, context))
+    let key = input.memo.key(LIKENESS, content.map(|content| look.key(content)), options);
+    input.memo.found_or_made(LIKENESS, key.as_ref(), |_| true, || likeness(look.features(input), context))
 }
 
-/// These pairs, in their order, without those of photographs that could not be measured.
+/// These pairs by a look at them, in their order, without those of photographs that could not be measured.
 fn match_candidates(
     input: &MatchInput,
     candidates: &[(usize, usize)],
+    look: Look,
     options: &MatchOptions,
     context: &StageContext,
 ) -> Result<Vec<PairMatches>> {
@@ -116,7 +218,8 @@ fn match_candidates(
     let told = input.told;
     let content = |a: usize, b: usize| {
         let (of_a, of_b) = (input.keys[a].as_ref()?, input.keys[b].as_ref()?);
-        Some(KeyMaker::new().key(of_a).key(of_b).part(&forced.contains(&(a, b))).part(&[told[a], told[b]]))
+        let maker = KeyMaker::new().key(of_a).key(of_b).part(&forced.contains(&(a, b)));
+        Some(look.key(maker.part(&[told[a], told[b]])))
     };
     let key = |a: usize, b: usize| input.memo.key(PAIR, content(a, b), options);
     let ordered = |&(a, b): &(usize, usize)| (a.min(b), a.max(b));
@@ -128,7 +231,12 @@ fn match_candidates(
     let mut matched: BTreeMap<(usize, usize), PairMatches> = candidates.iter().filter_map(recall).collect();
     let missing: Vec<(usize, usize)> =
         candidates.iter().copied().filter(|pair| !matched.contains_key(&ordered(pair))).collect();
-    let (features, frames) = (input.features, input.frames);
+    let (features, frames) = (look.features(input), input.frames);
+    if look == Look::Coarse {
+        // Each once, before several threads ask for the same.
+        let seen: BTreeSet<usize> = missing.iter().flat_map(|&(a, b)| [a, b]).collect();
+        seen.into_par_iter().try_for_each(|one| features.features(one).map(drop))?;
+    }
     let unmatched = matching::MatchingInput { features, frames, told, pairs: &missing, forced: &forced };
     let found = match input.workers {
         Some(workers) => workers.matched(&unmatched, context)?,
@@ -140,4 +248,61 @@ fn match_candidates(
         matched.insert((pair.a, pair.b), pair);
     }
     Ok(candidates.iter().filter_map(|pair| matched.remove(&ordered(pair))).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memo::PhotographCache;
+    use crate::options::StitchOptions;
+    use crate::pipeline::{Alignment, Stitcher};
+    use crate::test_room::{TOO_FEW_FEATURES, room_in_memory, room_with_a_blurred_photograph};
+
+    fn aligned(assignments: &[&str], cache: Option<&PhotographCache>, threads: usize) -> Alignment {
+        let mut options = StitchOptions::default();
+        let assignments = [TOO_FEW_FEATURES].into_iter().chain(assignments.iter().copied());
+        assignments.for_each(|assignment| options.set(assignment).expect("an option"));
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let context = StageContext::default();
+            let stitcher = Stitcher::new(&options, &context).with_cache(cache);
+            stitcher.align(&room_with_a_blurred_photograph()).expect("a panorama").alignments.remove(0)
+        })
+    }
+
+    fn blurred(alignment: &Alignment) -> Vec<&Subject> {
+        let told = alignment.project.diagnostics.iter().filter(|one| one.code == JOINED_BY_COARSE);
+        told.map(|one| &one.subject).collect()
+    }
+
+    /// By its strongest features, the last photograph has too few matches with the others.
+    #[test]
+    fn a_blurred_photograph_is_joined_by_what_is_coarse() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let cache = PhotographCache::open(desk.path(), 1e9).expect("a cache");
+        let found = aligned(&[], None, 1);
+        assert_eq!(found.project.used(), 5);
+        assert_eq!(blurred(&found), [&Subject::Photograph(4)]);
+        let made = |cache: &PhotographCache| cache.uses().get("pair").map_or(0, |pairs| pairs.made);
+        for threads in [2, 3] {
+            let again = aligned(&[], Some(&cache), threads);
+            assert_eq!(again.project.images, found.project.images);
+            assert_eq!(blurred(&again).len(), 1);
+            assert_eq!(made(&cache), 14, "ten pairs, and four of them once more; none in the second run");
+        }
+        // By their looks where not all pairs are matched.
+        let by_looks = aligned(&["pairing.exhaustive_up_to=2"], None, 2);
+        assert_eq!((by_looks.project.used(), blurred(&by_looks).len()), (5, 1));
+    }
+
+    #[test]
+    fn where_nothing_is_left_over_nothing_is_looked_at_again() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let cache = PhotographCache::open(desk.path(), 1e9).expect("a cache");
+        let (options, context) = (StitchOptions::default(), StageContext::default());
+        let stitcher = Stitcher::new(&options, &context).with_cache(Some(&cache));
+        let aligned = stitcher.align(&room_in_memory(|photograph| photograph)).expect("a panorama");
+        assert!(blurred(&aligned.alignments[0]).is_empty());
+        assert_eq!(cache.uses().get("pair").map_or(0, |pairs| pairs.made), 10);
+    }
 }

@@ -9,6 +9,7 @@ pub(crate) mod arrange;
 mod borders;
 mod budget;
 mod carrier;
+mod coarse;
 pub(crate) mod compose;
 mod frames;
 pub(crate) mod light;
@@ -55,6 +56,7 @@ use self::borders::{BordersInput, Unbordered};
 use self::budget::Budget;
 pub use self::carrier::CARRIER_LEFT_OUT;
 use self::carrier::{CarrierInput, CarrierLeftOut};
+use self::coarse::{CoarseFeatures, CoarseInput};
 pub use self::compose::CROP_TOO_SMALL;
 use self::compose::{ComposeInput, Composed, Destination, LightInput, SmallPhotograph};
 pub use self::frames::FRAMES_PASSED_OVER;
@@ -182,8 +184,17 @@ impl<'a> Stitcher<'a> {
             let cameras = &self.options.align.cameras;
             let told = |(image, &frame): (&SourceImage, &WorkingFrame)| camera_prior(image, frame).told_lens(cameras);
             let told: Vec<ToldLens> = matched.set.images.iter().zip(&looked_at.frames).map(told).collect();
+            let features = FeaturesOnShelf(looked_at.features.iter().map(Option::as_ref).collect());
+            let coarse = CoarseInput {
+                fine: &features,
+                frames: &looked_at.frames,
+                files: &matched.set.files,
+                shelf,
+                options: &self.options.measure.features,
+            };
             let input = MatchInput {
-                features: &FeaturesOnShelf(looked_at.features.iter().map(Option::as_ref).collect()),
+                features: &features,
+                coarse: &CoarseFeatures::new(coarse, context),
                 frames: &looked_at.frames,
                 told: &told,
                 usable: &looked_at.usable,

@@ -12,7 +12,7 @@ use crate::inputs::Inputs;
 use crate::memo::PhotographCache;
 use crate::options::StitchOptions;
 use crate::pipeline::{Alignment, Stitcher};
-use crate::test_room::{ROOM, samples_of};
+use crate::test_room::{ROOM, TOO_FEW_FEATURES, room_with_a_blurred_photograph, samples_of};
 
 /// Does tasks in the wrong order, each by a worker of its own.
 #[derive(Default)]
@@ -112,6 +112,18 @@ fn photographs_that_only_one_program_holds_are_not_handed_out() {
     let (_, again) = stitched(&inputs, &options, None, Some(&here)).expect("divided");
     assert!(samples_of(&again.panorama) == samples_of(&rendered.panorama));
     assert_eq!(*here.tasks.lock().expect("no test failed"), 1, "pairs alone: features can be handed over");
+}
+
+/// What is coarse is found here, and compared elsewhere.
+#[test]
+fn a_photograph_that_is_looked_at_again_is_handed_out_again() {
+    let (inputs, options) = (room_with_a_blurred_photograph(), options(&[TOO_FEW_FEATURES]));
+    let (alone, _) = stitched(&inputs, &options, None, None).expect("alone");
+    let here = Here::default();
+    let (divided, _) = stitched(&inputs, &options, None, Some(&here)).expect("divided");
+    assert_eq!(alone.project.used(), 5);
+    assert_eq!(record(&divided), record(&alone));
+    assert_eq!(*here.tasks.lock().expect("no test failed"), 2, "all pairs, then those of the photograph");
 }
 
 #[test]
