@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 use trueup_align::stitch_graph::StitchGraph;
 use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
-use trueup_core::matches::PairMatches;
+use trueup_core::matches::{PairMatches, PairVerdict};
 use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::told_lens::ToldLens;
 use trueup_core::{Result, StageContext};
@@ -122,7 +122,10 @@ fn look_again(input: &MatchInput, first: Matches, options: &MatchOptions, contex
     let alone = |matches: &Matches| -> BTreeSet<usize> {
         matches.graph.components.iter().filter(|group| group.len() == 1).flatten().copied().collect()
     };
-    let (were_alone, mut matches, mut tried) = (alone(&first), first, BTreeSet::new());
+    // What looks different does so however it is looked at.
+    let differing = first.pairs.iter().filter(|pair| pair.verdict == PairVerdict::LooksDifferent);
+    let mut tried: BTreeSet<(usize, usize)> = differing.map(|pair| (pair.a, pair.b)).collect();
+    let (were_alone, mut matches) = (alone(&first), first);
     let known = OnceCell::new();
     let looks = || match known.get() {
         Some(likeness) => Ok(likeness),
