@@ -19,7 +19,7 @@ use crate::memo::{Key, KeyMaker, LIKENESS, Memo, PAIR};
 use crate::options::MatchOptions;
 use crate::workers::Division;
 
-/// The code of photographs that are joined to others only by what is coarse.
+/// The code of pairs that are joined by what is coarse alone.
 pub(crate) const JOINED_BY_COARSE: &str = "joined-by-coarse-features";
 
 /// What the phase works on. Photographs are counted 0..N; `features`, `coarse`, `frames`, `told`, `usable`, `images` and `keys` have N entries.
@@ -119,13 +119,10 @@ fn is_stranger(strangers: &[Stranger], photograph: usize) -> bool {
 /// Looks at the pairs that are apart by what is coarse, and joins those that overlap by that; a pair that does not keeps its verdict. Where nothing is
 /// left over, nothing is looked at.
 fn look_again(input: &MatchInput, first: Matches, options: &MatchOptions, context: &StageContext) -> Result<Matches> {
-    let alone = |matches: &Matches| -> BTreeSet<usize> {
-        matches.graph.components.iter().filter(|group| group.len() == 1).flatten().copied().collect()
-    };
     // What looks different does so however it is looked at.
     let differing = first.pairs.iter().filter(|pair| pair.verdict == PairVerdict::LooksDifferent);
     let mut tried: BTreeSet<(usize, usize)> = differing.map(|pair| (pair.a, pair.b)).collect();
-    let (were_alone, mut matches) = (alone(&first), first);
+    let mut matches = first;
     let known = OnceCell::new();
     let looks = || match known.get() {
         Some(likeness) => Ok(likeness),
@@ -146,16 +143,16 @@ fn look_again(input: &MatchInput, first: Matches, options: &MatchOptions, contex
             break;
         }
         tried.extend(candidates);
+        for pair in &found {
+            context.report(Diagnostic::note(
+                JOINED_BY_COARSE,
+                Subject::Pair(pair.a, pair.b),
+                "they share only what is coarse, as where one of them is blurred",
+                "Leave out what is blurred, if others show the same.",
+            ));
+        }
         let pairs = replaced(matches.pairs, found, !input.wished.is_empty());
         matches = judged(input, pairs);
-    }
-    for &photograph in were_alone.difference(&alone(&matches)) {
-        context.report(Diagnostic::note(
-            JOINED_BY_COARSE,
-            Subject::Photograph(photograph),
-            "it shares with others only what is coarse, as a blurred photograph does",
-            "Leave it out if the panorama is not sharp there and others show the same.",
-        ));
     }
     Ok(matches)
 }
@@ -273,9 +270,14 @@ mod tests {
         })
     }
 
-    fn blurred(alignment: &Alignment) -> Vec<&Subject> {
+    /// The pairs that are joined by what is coarse.
+    fn coarse(alignment: &Alignment) -> Vec<&Subject> {
         let told = alignment.project.diagnostics.iter().filter(|one| one.code == JOINED_BY_COARSE);
         told.map(|one| &one.subject).collect()
+    }
+
+    fn are_of_the_last(pairs: &[&Subject]) -> bool {
+        !pairs.is_empty() && pairs.iter().all(|pair| matches!(pair, Subject::Pair(_, 4)))
     }
 
     /// By its strongest features, the last photograph has too few matches with the others.
@@ -285,17 +287,18 @@ mod tests {
         let cache = PhotographCache::open(desk.path(), 1e9).expect("a cache");
         let found = aligned(&[], None, 1);
         assert_eq!(found.project.used(), 5);
-        assert_eq!(blurred(&found), [&Subject::Photograph(4)]);
+        assert!(are_of_the_last(&coarse(&found)), "{:?}", coarse(&found));
         let made = |cache: &PhotographCache| cache.uses().get("pair").map_or(0, |pairs| pairs.made);
         for threads in [2, 3] {
             let again = aligned(&[], Some(&cache), threads);
             assert_eq!(again.project.images, found.project.images);
-            assert_eq!(blurred(&again).len(), 1);
+            assert_eq!(coarse(&again), coarse(&found));
             assert_eq!(made(&cache), 14, "ten pairs, and four of them once more; none in the second run");
         }
         // By their looks where not all pairs are matched.
         let by_looks = aligned(&["pairing.exhaustive_up_to=2"], None, 2);
-        assert_eq!((by_looks.project.used(), blurred(&by_looks).len()), (5, 1));
+        assert_eq!(by_looks.project.used(), 5);
+        assert!(are_of_the_last(&coarse(&by_looks)), "{:?}", coarse(&by_looks));
     }
 
     #[test]
@@ -305,7 +308,7 @@ mod tests {
         let (options, context) = (StitchOptions::default(), StageContext::default());
         let stitcher = Stitcher::new(&options, &context).with_cache(Some(&cache));
         let aligned = stitcher.align(&room_in_memory(|photograph| photograph)).expect("a panorama");
-        assert!(blurred(&aligned.alignments[0]).is_empty());
+        assert!(coarse(&aligned.alignments[0]).is_empty());
         assert_eq!(cache.uses().get("pair").map_or(0, |pairs| pairs.made), 10);
     }
 }
