@@ -12,8 +12,6 @@ pub(super) const FOCAL: usize = 0;
 pub(super) const CENTER: usize = 1;
 /// First of the four radial terms.
 pub(super) const RADIAL: usize = 3;
-/// The first two, of which the others follow seldom.
-pub(super) const RADIAL_TERMS: [usize; 2] = [RADIAL, RADIAL + 1];
 /// First of the two tangential terms.
 pub(super) const TANGENTIAL: usize = 7;
 
@@ -141,6 +139,16 @@ impl IntrinsicsModel {
         Self { parameters_of: group_of.iter().map(|&group| columns[group]).collect(), parameters }
     }
 
+    /// The same with a focal length for each photograph whose own is free.
+    pub(super) fn with_own_focal(&self) -> Self {
+        let mut held = self.with_focal_held();
+        for (of, shared) in held.parameters_of.iter_mut().zip(&self.parameters_of) {
+            of[FOCAL] = shared[FOCAL].map(|_| held.parameters);
+            held.parameters += usize::from(of[FOCAL].is_some());
+        }
+        held
+    }
+
     /// The same with all focal lengths held fixed.
     pub(super) fn with_focal_held(&self) -> Self {
         let is_focal = |parameter: usize| self.parameters_of.iter().any(|of| of[FOCAL] == Some(parameter));
@@ -182,5 +190,10 @@ mod tests {
         assert!((0..3).all(|photograph| column(photograph, FOCAL).is_none()));
         let first = (Some(0), None);
         assert_eq!([0, 1, 2].map(|k| (column(k, RADIAL), column(k, RADIAL + 1))), [first, (Some(1), Some(2)), first]);
+        let own = IntrinsicsModel::grouped(&[0, 1, 0], &free).with_own_focal();
+        assert_eq!((own.parameters, [0, 1, 2].map(|k| own.parameters_of[k][FOCAL])), (6, [Some(3), Some(4), Some(5)]));
+        assert_eq!([0, 1, 2].map(|k| own.parameters_of[k][RADIAL]), [Some(0), Some(1), Some(0)]);
+        // What is held stays so.
+        assert_eq!(held.with_own_focal().parameters, 3);
     }
 }

@@ -9,18 +9,24 @@ use trueup_core::matches::PointMatch;
 use trueup_core::statistics::median;
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
-use super::intrinsics::{FreeTerms, IntrinsicsModel, RADIAL_TERMS, set_free};
+use super::intrinsics::{CENTER, FreeTerms, IntrinsicsModel, RADIAL, set_free, standard_deviation};
 use super::lenses::LensSearch;
 use super::levenberg_marquardt::SETTLED;
 use super::observations::PairObservations;
 use super::transfer::CameraTransfer;
 use crate::evidence::{CommonSquare, OverlapGap};
 
+/// The terms that are asked for together, the fewest first. A lens that is off center leaves as much as one that bends in wide photographs, and of both neither alone explains anything.
+const TOGETHER: [&[usize]; 4] =
+    [&[RADIAL], &[RADIAL, RADIAL + 1], &[RADIAL, CENTER, CENTER + 1], &[RADIAL, RADIAL + 1, CENTER, CENTER + 1]];
 /// Most overlaps that are asked so. The spread of seven and more tells as well, in less time.
 const FEW_OVERLAPS: usize = 6;
 /// Share of the square of what neighboring matches err by alike that terms may leave to be believed for it. Measured on pairs and triples: less of two thirds of 83 cut through lenses (of most others the lens
 /// moves matches by hardly more than their noise) and of five photographed ones, whose lenses are those of the whole of their sets; 0.088 and more of some 160 photographed ones with parallax, above 1 of pinholes.
 const MOST_LEFT: f64 = 1.0 / 16.0;
+/// Standard deviations from the middle of the photograph beyond which a principal point is none, but what parallax makes of one. Of 280 photographed sets, pairs and triples it is within in three, two of which are parts
+/// of sets in which it lies there, and beyond in twelve.
+const MOST_OFF_CENTER: f64 = 1.0;
 /// The same of a first look at some of the matches, whose noise blurs it.
 const PROMISING: f64 = 0.25;
 /// When the cameras of that look are near enough: a step that saves less than this share of the cost is the last.
@@ -29,8 +35,32 @@ const NEARLY_SETTLED: f64 = 1e-4;
 const FARTHEST_IN_MEDIANS: f64 = 4.0;
 
 impl LensSearch<'_> {
-    /// Whether radial `terms` of all groups `of` that are asked leave next to nothing that neighboring matches err by alike: then `parameters` are refined with
-    /// them, and `free` has them. Never of many overlaps, nor of terms that are free already.
+    /// Whether terms of all groups `of` that are asked, the first of [`TOGETHER`] that do, leave next to nothing that neighboring matches err by alike: then `parameters` are refined
+    /// with them, and `free` has them. Never of many overlaps.
+    pub(super) fn is_explained_together(
+        &self,
+        of: &[bool],
+        parameters: &mut Parameters,
+        group_of: &[usize],
+        free: &mut [FreeTerms],
+    ) -> Result<bool> {
+        let mut all = free.to_vec();
+        TOGETHER.iter().for_each(|terms| set_free(&mut all, terms, of));
+        // What all of them leave, some would leave, too.
+        if self.has_many_overlaps()
+            || self.looked(Matches::Some, parameters, parameters, group_of, [free, &all])?.share > PROMISING
+        {
+            return Ok(false);
+        }
+        for terms in TOGETHER {
+            if self.is_explained_by(terms, of, parameters, group_of, free)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// The same of these `terms`. Never of terms that are free already or not in [`TOGETHER`].
     pub(super) fn is_explained_by(
         &self,
         terms: &[usize],
@@ -41,25 +71,16 @@ impl LensSearch<'_> {
     ) -> Result<bool> {
         let mut wished = free.to_vec();
         set_free(&mut wished, terms, of);
-        // What is off center is too much like a turn.
-        let is_asked = terms.iter().all(|term| RADIAL_TERMS.contains(term)) && wished != *free;
-        if !is_asked || self.problem.observations.pairs.len() > FEW_OVERLAPS {
+        let is_asked = terms.iter().all(|term| TOGETHER.concat().contains(term)) && wished != *free;
+        if !is_asked || self.has_many_overlaps() {
             return Ok(false);
         }
-        let [without, with] = [&*free, &wished].map(|free| IntrinsicsModel::grouped(group_of, free));
         let mut found = parameters.clone();
-        // Some of the matches show that most lenses are not worth a closer look.
-        for (problem, settled, most_left) in
-            [(self.problem, NEARLY_SETTLED, PROMISING), (self.precise, SETTLED, MOST_LEFT)]
-        {
-            let refined = |start: &Parameters, model: &IntrinsicsModel, huber_px: f64| {
-                problem.minimize_until(settled, start.clone(), model, huber_px, self.context)
-            };
-            let before = refined(parameters, &without, FINE_HUBER_PX)?;
-            found = refined(&refined(&found, &with, COARSE_HUBER_PX)?, &with, FINE_HUBER_PX)?;
+        for (matches, most_left) in [(Matches::Some, PROMISING), (Matches::Enough, MOST_LEFT)] {
+            let looked = self.looked(matches, parameters, &found, group_of, [free, &wished])?;
+            found = looked.parameters;
             let is_visible = (0..of.len()).any(|group| of[group] && self.is_visible(&found, group_of, group));
-            let is_explained = share_left(problem, &before, &found) <= most_left;
-            if !(is_visible && is_explained) {
+            if !(is_visible && self.is_expected(&found) && looked.share <= most_left) {
                 return Ok(false);
             }
         }
@@ -67,11 +88,62 @@ impl LensSearch<'_> {
         *parameters = found;
         Ok(true)
     }
+
+    fn has_many_overlaps(&self) -> bool {
+        self.problem.observations.pairs.len() > FEW_OVERLAPS
+    }
+
+    /// The cameras refined by these matches from `start` on with the second terms free, and what they leave of what `parameters` refined with the first leave.
+    fn looked(
+        &self,
+        matches: Matches,
+        parameters: &Parameters,
+        start: &Parameters,
+        group_of: &[usize],
+        free: [&[FreeTerms]; 2],
+    ) -> Result<Looked> {
+        let (problem, settled) = match matches {
+            Matches::Some => (self.problem, NEARLY_SETTLED),
+            Matches::Enough => (self.precise, SETTLED),
+        };
+        let [without, with] = free.map(|free| IntrinsicsModel::grouped(group_of, free));
+        let refined = |start: &Parameters, model: &IntrinsicsModel, huber_px: f64| {
+            problem.minimize_until(settled, start.clone(), model, huber_px, self.context)
+        };
+        let before = refined(parameters, &without, FINE_HUBER_PX)?;
+        let found = refined(&refined(start, &with, COARSE_HUBER_PX)?, &with, FINE_HUBER_PX)?;
+        let share = share_left(problem, &before, &found);
+        Ok(Looked { parameters: found, share })
+    }
+
+    /// Whether no principal point is farther off than lenses have it.
+    fn is_expected(&self, found: &Parameters) -> bool {
+        found.lenses.iter().zip(self.problem.priors).all(|(lens, prior)| {
+            let [x, y] = lens.center_px;
+            x.hypot(y) <= MOST_OFF_CENTER * standard_deviation(CENTER, &prior.frame)
+        })
+    }
+}
+
+/// Which matches are looked at.
+#[derive(Debug, Clone, Copy)]
+enum Matches {
+    /// Some, by cameras that are nearly settled: they show that most lenses are not worth a closer look.
+    Some,
+    /// Those that tell how large terms are.
+    Enough,
+}
+
+/// What a look at a lens shows.
+struct Looked {
+    parameters: Parameters,
+    /// [`share_left`] of it.
+    share: f64,
 }
 
 /// Of what neighboring matches err by alike with the cameras `before`, the share (of its square) that is hardly exceeded with those `after`. Infinite where nothing was in
 /// common before.
-fn share_left(problem: &BundleAdjustment<'_>, before: &Parameters, after: &Parameters) -> f64 {
+pub(super) fn share_left(problem: &BundleAdjustment<'_>, before: &Parameters, after: &Parameters) -> f64 {
     let (before, after) = (gaps(problem, before), gaps(problem, after));
     let mut distances: Vec<f64> = after.iter().flatten().map(|one| one.gap.norm()).collect();
     let Some(median) = median(&mut distances) else { return f64::INFINITY };
@@ -87,7 +159,7 @@ fn share_left(problem: &BundleAdjustment<'_>, before: &Parameters, after: &Param
 }
 
 /// The matches of every overlap as these cameras have them, where they see them.
-fn gaps(problem: &BundleAdjustment<'_>, parameters: &Parameters) -> Vec<Vec<OverlapGap>> {
+pub(super) fn gaps(problem: &BundleAdjustment<'_>, parameters: &Parameters) -> Vec<Vec<OverlapGap>> {
     let cameras = parameters.cameras(problem.priors);
     let of_pair = |pair: &PairObservations| {
         let transfer = CameraTransfer::Rotating(&cameras[pair.a], &cameras[pair.b]);

@@ -4,7 +4,7 @@ use trueup_core::{Result, StageContext};
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
 use super::intrinsics::{
-    CENTER, FOCAL, FreeTerms, IntrinsicsModel, RADIAL, RADIAL_TERMS, TANGENTIAL, ZOOM_SPREAD, only_focal, set_free,
+    CENTER, FOCAL, FreeTerms, IntrinsicsModel, RADIAL, TANGENTIAL, ZOOM_SPREAD, only_focal, set_free,
 };
 use super::lens_evidence::{LensEvidence, Witness};
 use super::options::LensKind;
@@ -74,13 +74,14 @@ impl LensSearch<'_> {
                 let asked = bent;
                 bent = self.bent(&mut parameters, group_of, &mut free, &asked)?;
                 if !bent.contains(&true) {
-                    // A strong lens leaves too much to its first term alone.
-                    let mut explains =
-                        |terms| self.is_explained_by(terms, &asked, &mut parameters, group_of, &mut free);
-                    if !explains(terms)? && !explains(&RADIAL_TERMS)? {
+                    bent = if self.is_explained_together(&asked, &mut parameters, group_of, &mut free)? {
+                        asked.clone()
+                    } else {
+                        self.off_center(&mut parameters, group_of, &mut free, &asked)?
+                    };
+                    if !bent.contains(&true) {
                         return Ok(None);
                     }
-                    bent.clone_from(&asked);
                 }
                 if self.add_settings(group_of, &asked, &bent, &mut free) {
                     let model = IntrinsicsModel::grouped(group_of, &free);
@@ -164,11 +165,41 @@ impl LensSearch<'_> {
         Ok(bent)
     }
 
-    /// Whether k1, as it is in `parameters`, is worth a lens: of a pinhole the first look may show a bend that is gone when the
-    /// cameras have settled.
+    /// Which of the groups in `asked` have a lens that is off center, whatever it bends beside: those of which matches tell so. `parameters` are refined
+    /// with it, `free` has it.
+    fn off_center(
+        &self,
+        parameters: &mut Parameters,
+        group_of: &[usize],
+        free: &mut [FreeTerms],
+        asked: &[bool],
+    ) -> Result<Vec<bool>> {
+        // How far it bends is open.
+        let mut open = free.to_vec();
+        set_free(&mut open, &[RADIAL], asked);
+        let ask = Ask { terms: &[CENTER, CENTER + 1], of: asked, huber_px: FINE_HUBER_PX };
+        let mut told = self.told(self.problem, parameters, group_of, &open, &ask).by_matches;
+        let mut wished = free.to_vec();
+        set_free(&mut wished, &[RADIAL, CENTER, CENTER + 1], &told);
+        let model = IntrinsicsModel::grouped(group_of, &wished);
+        let coarse = self.problem.minimize(parameters.clone(), &model, COARSE_HUBER_PX, self.context)?;
+        let fine = self.problem.minimize(coarse, &model, FINE_HUBER_PX, self.context)?;
+        if (0..told.len()).all(|group| !told[group] || self.is_visible(&fine, group_of, group)) {
+            free.clone_from_slice(&wished);
+            *parameters = fine;
+        } else {
+            told.fill(false);
+        }
+        Ok(told)
+    }
+
+    /// Whether k1 and the principal point, as they are in `parameters`, are worth a lens: of a pinhole the first look may show a bend that is gone when
+    /// the cameras have settled.
     pub(super) fn is_visible(&self, parameters: &Parameters, group_of: &[usize], group: usize) -> bool {
         group_of.iter().position(|&of| of == group).is_some_and(|member| {
-            self.corner_shift(parameters, member, parameters.lenses[member].term(RADIAL)) > LEAST_SHIFT_PX
+            let lens = &parameters.lenses[member];
+            let by_center = self.off_center_shift(parameters, member, lens.center_px);
+            self.corner_shift(parameters, member, lens.term(RADIAL)).max(by_center) > LEAST_SHIFT_PX
         })
     }
 
@@ -236,6 +267,12 @@ impl LensSearch<'_> {
             told.fold(f64::INFINITY, f64::min)
         };
         (0..groups).filter(is_asked).map(of_group).max_by(f64::total_cmp)
+    }
+
+    /// By how many working pixels a principal point off the middle moves the corners of a photograph beyond what a turn does.
+    fn off_center_shift(&self, parameters: &Parameters, photograph: usize, [x, y]: [f64; 2]) -> f64 {
+        let radius_px = 0.5 * self.problem.priors[photograph].frame.diagonal();
+        x.hypot(y) * (radius_px / parameters.focal_px[photograph]).powi(2)
     }
 
     /// By how many working pixels k1 moves the corners of a photograph.

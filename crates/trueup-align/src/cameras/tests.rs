@@ -151,6 +151,25 @@ fn a_zoom_of_one_photograph_is_noticed() {
     }
 }
 
+/// An automatic focus moves the corners of photographs, 500 px from the middle, by up to 5 px. The second row has a lens besides, the third has two photographs.
+#[test]
+fn focal_lengths_that_the_focus_changes_are_found() {
+    let focus = [0.0, 0.7, -0.9, 0.4, -0.2, 1.0, -0.6, 0.3];
+    for (count, k1) in [(8, 0.0), (8, -0.06), (2, 0.0)] {
+        let refocused =
+            |(camera, percent): (Camera, f64)| Camera { focal_px: camera.focal_px * (1.0 + 0.01 * percent), ..camera };
+        let truth: Vec<Camera> = row(ROLLS).into_iter().zip(focus).map(refocused).take(count).collect();
+        let truth = bent(truth, [k1, 0.0, 0.0, 0.0], [0.0; 2]);
+        let cameras = estimate(&matched(&truth, 0.3, 0.0), None, &vec![0; count]);
+        assert!(cameras.per_picture_focal, "{count} {k1}");
+        for pair in 1..count {
+            let ratio = |cameras: &[Camera]| cameras[pair].focal_px / cameras[0].focal_px;
+            let error = ratio(&cameras.cameras) / ratio(&truth) - 1.0;
+            assert!(error.abs() < 0.001, "{count} {k1}: {error}");
+        }
+    }
+}
+
 /// Cameras with this lens, and the principal point off center.
 pub(super) fn bent(cameras: Vec<Camera>, radial: [f64; 4], off: [f64; 2]) -> Vec<Camera> {
     let lens = Lens::new(LensTerms { radial, ..LensTerms::default() });
@@ -218,16 +237,29 @@ fn a_bend_that_does_not_stay_is_no_lens() {
     assert!(found.is_none(), "{:?}", found.map(|found| found.parameters.lenses[0]));
 }
 
-/// Two overlaps have no spread, but through the lens they leave nothing but noise. It moves the corners by 24 px.
+/// Two overlaps have no spread, but through the lens they leave nothing but noise. It moves the corners by 24 px, or nothing but the middle by 7 of
+/// the photographs' 1000 px of diagonal.
 #[test]
 fn a_pair_and_a_triple_from_one_place_tell_their_lens() {
-    for count in [2, 3] {
-        let truth = bent(row(ROLLS)[..count].to_vec(), [-0.08, 0.0, 0.0, 0.0], [0.0; 2]);
+    for (count, k1, off) in [(2, -0.08, [0.0; 2]), (3, -0.08, [0.0; 2]), (2, -0.08, [6.0, -4.0]), (3, 0.0, [-4.0, 6.0])]
+    {
+        let truth = bent(row(ROLLS)[..count].to_vec(), [k1, 0.0, 0.0, 0.0], off);
         let cameras = estimate(&matched(&truth, 0.3, 0.0), None, &vec![0; count]);
         let found = &cameras.cameras[0];
-        assert!((found.lens.terms().radial[0] + 0.08).abs() < 0.004, "{found:?}");
+        assert!((found.lens.terms().radial[0] - k1).abs() < 0.004, "{found:?}");
         assert!((found.focal_px / 650.0 - 1.0).abs() < 0.01, "{found:?}");
+        let middle = [WIDTH / 2.0 + off[0], HEIGHT / 2.0 + off[1]];
+        assert!((Vector2::from(found.principal_point) - Vector2::from(middle)).norm() < 1.5, "{found:?}");
     }
+}
+
+/// A middle that far off is no lens's, but what parallax makes of one.
+#[test]
+fn a_pair_that_is_far_off_center_tells_no_lens() {
+    let truth = bent(row(ROLLS)[..2].to_vec(), [0.0; 4], [25.0, -20.0]);
+    let cameras = estimate(&matched(&truth, 0.3, 0.0), None, &[0; 2]);
+    assert!(cameras.cameras.iter().all(|camera| camera.lens.is_pinhole()), "{:?}", cameras.cameras[0]);
+    assert!(cameras.cameras.iter().all(|camera| camera.principal_point == [WIDTH / 2.0, HEIGHT / 2.0]));
 }
 
 /// Parallax bends what a pair says as a lens would, but also otherwise: before a wall that recedes from 3 to 7 focal units, from places 0.2 apart.
