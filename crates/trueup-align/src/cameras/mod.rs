@@ -3,7 +3,7 @@
 //! Start values come from metadata, from the pair homographies (`homography_focal`) and from a search over a common focal length (`focal`), or as GSP
 //! has them from local homographies (`local_focal`);
 //! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
-//! bundle adjustment (`bundle`), from coarse to fine (`refinement`), photographs that differ with focal lengths of their own where a lens was zoomed (`zoom`).
+//! bundle adjustment (`bundle`), from coarse to fine (`refinement`), photographs that differ with focal lengths of their own where a lens was zoomed or refocused (`zoom`).
 //! Terms of the lenses are added as long as the matches, and
 //! edges that are to be straight (`straightness`), are sure of them (`lenses`, `lens_evidence`; of few overlaps `lens_by_residual`): a pinhole stays one. All this is a `solution`. Pairs that then contradict the others are set
 //! aside (`contradictions`), unless cameras without the weaker ones explain more (`believed`). Focal lengths that parallax leaves open are those that are expected, in part (`expected_focal`), and those through which lines lie at right angles (`directions`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried

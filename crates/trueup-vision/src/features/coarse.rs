@@ -1,11 +1,11 @@
 //! Coarse features: what is left to see of a photograph that was blurred.
 
-use trueup_core::raster::Raster;
 use trueup_core::{Result, StageContext};
 
 use super::detect;
 use super::feature::{FeaturePoint, Features};
 use super::options::FeatureOptions;
+use crate::gray::halved;
 
 /// The features of a photograph at half its size, in its own pixels; `fine` are those at its own, of which what surrounds them is looked at.
 ///
@@ -17,6 +17,8 @@ use super::options::FeatureOptions;
 /// # Errors
 /// Those of [`detect`].
 pub fn detect_coarse(fine: &Features, options: &FeatureOptions, context: &StageContext) -> Result<Features> {
+    // Means are blurred by half a sample, which is what a search for features assumes: by half a sample of the picture itself, by 0.7 as what surrounds features,
+    // and by 0.5 as means, 1.0 of the picture's samples in all.
     let half = halved(&fine.surroundings);
     let found = detect(&half, options, context)?;
     let in_own_pixels = |point: FeaturePoint| FeaturePoint {
@@ -31,32 +33,11 @@ pub fn detect_coarse(fine: &Features, options: &FeatureOptions, context: &StageC
     })
 }
 
-/// The means of two by two samples; an odd last row or column is left out. They are blurred by half a sample, which is what a search for features
-/// assumes: by half a sample of the picture itself, by 0.7 as what surrounds features, and by 0.5 as means, 1.0 of the picture's samples in all.
-fn halved(picture: &Raster<u8>) -> Raster<f32> {
-    let mut half = Raster::new(picture.width() / 2, picture.height() / 2, 1);
-    for y in 0..half.height() {
-        let [upper, lower] = [2 * y, 2 * y + 1].map(|y| picture.row(y));
-        let pairs = upper.chunks_exact(2).zip(lower.chunks_exact(2));
-        for (mean, (upper, lower)) in half.row_mut(y).iter_mut().zip(pairs) {
-            *mean = upper.iter().chain(lower).map(|&sample| f32::from(sample)).sum::<f32>() / 4.0;
-        }
-    }
-    half
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use trueup_core::raster::Raster;
 
-    #[test]
-    fn a_sample_is_the_mean_of_four() {
-        let picture =
-            Raster::from_data(5, 3, 1, vec![1, 3, 0, 0, 9, 5, 8, 0, 1, 9, 7, 7, 7, 7, 7]).expect("15 samples");
-        let half = halved(&picture);
-        assert_eq!((half.width(), half.height(), half.data()), (2, 1, &[4.25, 0.25][..]));
-        assert!(halved(&Raster::new(0, 0, 1)).data().is_empty());
-    }
+    use super::*;
 
     /// A blob is where it was and as large.
     #[test]

@@ -49,6 +49,11 @@ impl Resemblance<'_> {
     /// surrounds features.
     pub(super) fn is_missing(&self, in_overlap: usize) -> bool {
         let few = (in_overlap as f64 / FEW_MATCHED) as usize;
+        // Of most overlaps so many match that all squares of the photograph would be fewer.
+        let [columns, rows] = squares(&self.a.surroundings);
+        if columns * rows <= few {
+            return false;
+        }
         let places = self.places();
         if places.len().max(FEWEST_SQUARES) <= few {
             return false;
@@ -97,6 +102,11 @@ impl Resemblance<'_> {
     }
 }
 
+/// Squares of a picture along each axis.
+fn squares(picture: &Raster<u8>) -> [usize; 2] {
+    [picture.width(), picture.height()].map(|length| length.saturating_sub(SIDE) / SPACING_PX)
+}
+
 /// Which squares of a photograph hold a feature.
 struct Occupied {
     /// Squares along each axis.
@@ -107,8 +117,7 @@ struct Occupied {
 
 impl Occupied {
     fn new(features: &Features) -> Self {
-        let picture = &features.surroundings;
-        let count = [picture.width(), picture.height()].map(|length| length.saturating_sub(SIDE) / SPACING_PX);
+        let count = squares(&features.surroundings);
         let mut occupied = Self { count, holds: vec![false; count[0] * count[1]] };
         for point in &features.points {
             if let Some(square) = occupied.square(point.position.into()) {

@@ -17,8 +17,9 @@ use trueup_core::interpolation::cubic_convolution_taps;
 use trueup_core::raster::Raster;
 use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median};
 
-use super::likeness::{CLIPPED, CRUSHED, expected, halved, likeness};
+use super::likeness::{CLIPPED, CRUSHED, expected, likeness};
 use super::limits::MOST_SHIFT;
+use crate::gray::halved;
 
 /// Shortest side of the coarsest pictures, in pixels.
 const COARSEST_PX: usize = 48;

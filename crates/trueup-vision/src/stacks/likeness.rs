@@ -123,19 +123,6 @@ pub(super) fn gray(picture: &Raster<u8>) -> Option<Raster<f32>> {
     Raster::from_data(picture.width(), picture.height(), 1, pixels.iter().map(luma).collect()).ok()
 }
 
-/// The picture at half its size: means of two by two.
-pub(super) fn halved(picture: &Raster<f32>) -> Raster<f32> {
-    let mut half = Raster::new(picture.width() / 2, picture.height() / 2, 1);
-    for y in 0..half.height() {
-        let (upper, lower) = (picture.row(2 * y), picture.row(2 * y + 1));
-        let pairs = upper.chunks_exact(2).zip(lower.chunks_exact(2));
-        for (mean, (upper, lower)) in half.row_mut(y).iter_mut().zip(pairs) {
-            *mean = 0.25 * (upper[0] + upper[1] + lower[0] + lower[1]);
-        }
-    }
-    half
-}
-
 /// Share of the picture in which neither exposure may be black or white for their stops to be those of these places alone: as much as must tell of a view.
 const LEAST_IN_BOTH: f64 = 0.02;
 

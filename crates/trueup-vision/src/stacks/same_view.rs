@@ -2,8 +2,9 @@
 
 use trueup_core::raster::Raster;
 
-use super::likeness::{Likeness, expected, gray, halved, likeness, stops_between};
+use super::likeness::{Likeness, expected, gray, likeness, stops_between};
 use super::limits::{LEAST_STEP, LEAST_STOPS, MOST_SHIFT, ONE_EXPOSURE};
+use crate::gray::halved;
 
 /// Longest side, in pixels, of the copies that the search begins with.
 const COARSEST_PX: usize = 64;

@@ -95,8 +95,7 @@ pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageCon
     context.gather(|context| {
         let pairs = context.time("matching", || match_pairs(input, options, context))?;
         let matches = context.time("matching", || look_again(input, judged(input, pairs), options, context))?;
-        let is_stranger = |photograph| is_stranger(&matches.strangers, photograph);
-        let known = matches.pairs.iter().filter(|pair| !is_stranger(pair.a) && !is_stranger(pair.b));
+        let known = without(&matches.strangers, &matches.pairs);
         // A marked photograph is meant to stand for itself beside others of its view.
         let unmarked = |pair: &&PairMatches| [pair.a, pair.b].iter().all(|&one| !input.marked[one]);
         matching::report_near_duplicates(known.filter(unmarked), context);
@@ -107,9 +106,13 @@ pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageCon
 /// What pairs come to: which photographs are none of the scene, and which of the others are joined.
 fn judged(input: &MatchInput, pairs: Vec<PairMatches>) -> Matches {
     let strangers = if input.wished.is_empty() { strangers(input, &pairs) } else { Vec::new() };
-    let known = pairs.iter().filter(|pair| !is_stranger(&strangers, pair.a) && !is_stranger(&strangers, pair.b));
-    let graph = StitchGraph::new(input.features.photographs(), known);
+    let graph = StitchGraph::new(input.features.photographs(), without(&strangers, &pairs));
     Matches { pairs, strangers, graph }
+}
+
+/// The pairs of photographs that are no strangers.
+fn without<'a>(strangers: &'a [Stranger], pairs: &'a [PairMatches]) -> impl Iterator<Item = &'a PairMatches> {
+    pairs.iter().filter(|pair| !is_stranger(strangers, pair.a) && !is_stranger(strangers, pair.b))
 }
 
 fn is_stranger(strangers: &[Stranger], photograph: usize) -> bool {
