@@ -20,9 +20,9 @@ const LEAST_SHIFT_PX: f64 = 0.5;
 /// How much more matches, or edges, may cost with lenses than with pinholes: what is told by the ones and denied by the others is
 /// no lens.
 const DENIED: f64 = 1.02;
-/// The terms in the order in which they are asked for.
-const BLOCKS: [&[usize]; 5] =
-    [&[RADIAL], &[RADIAL + 1], &[CENTER, CENTER + 1], &[TANGENTIAL, TANGENTIAL + 1], &[RADIAL + 2]];
+/// The terms in the order in which they are asked for; what hides beside a principal point off center once more.
+const BLOCKS: [&[usize]; 6] =
+    [&[RADIAL], &[RADIAL + 1], &[CENTER, CENTER + 1], &[RADIAL + 1], &[TANGENTIAL, TANGENTIAL + 1], &[RADIAL + 2]];
 
 /// The search for lenses.
 pub(super) struct LensSearch<'a> {
@@ -62,8 +62,15 @@ impl LensSearch<'_> {
             bent[group] &= prior.lens.is_none();
         }
         let mut parameters = start.clone();
+        let mut free_before = free.clone();
         for (block, &terms) in BLOCKS.iter().enumerate() {
             self.context.check_cancelled()?;
+            let is_free = |group: usize| terms.iter().all(|&term| free[group][term]);
+            let is_repeated = BLOCKS[..block].contains(&terms);
+            if is_repeated && (free == free_before || (0..groups).all(|group| !bent[group] || is_free(group))) {
+                continue;
+            }
+            free_before.clone_from(&free);
             let mut problem = self.problem;
             if block + 1 == BLOCKS.len() {
                 problem = self.precise;
