@@ -156,11 +156,13 @@ impl End<'_> {
     /// What was found, with the focal lengths that are most probable where matches leave them open.
     fn refined(&self, found: Found) -> Result<Refined> {
         let Found { mut parameters, mut model, mut per_picture_focal } = found;
-        if self.options.focal_sharing == FocalSharing::Auto && !per_picture_focal && parameters.focal_px.len() > 1 {
-            if let Some(own) = zoom::refocused(self.problem, &model, &parameters, self.context)? {
-                (parameters, model) = own;
-                per_picture_focal = true;
-            }
+        let may_differ = self.options.focal_sharing == FocalSharing::Auto && parameters.focal_px.len() > 1;
+        if may_differ
+            && !per_picture_focal
+            && let Some(own) = zoom::refocused(self.problem, &model, &parameters, self.context)?
+        {
+            (parameters, model) = own;
+            per_picture_focal = true;
         }
         let is_lens_told = parameters.has_lens() && !model.has_lens();
         // Of photographs that parallax gives focal lengths of their own, no common factor makes angles right.
