@@ -46,7 +46,7 @@ impl LensSearch<'_> {
     ) -> Result<bool> {
         let mut all = free.to_vec();
         TOGETHER.iter().for_each(|terms| set_free(&mut all, terms, of));
-        // What all of them leave, some would leave, too.
+        // Where all of them leave more than is promising, fewer do, too.
         if self.has_many_overlaps()
             || self.looked(Matches::Some, parameters, parameters, group_of, [free, &all])?.share > PROMISING
         {
@@ -71,7 +71,8 @@ impl LensSearch<'_> {
     ) -> Result<bool> {
         let mut wished = free.to_vec();
         set_free(&mut wished, terms, of);
-        let is_asked = terms.iter().all(|term| TOGETHER.concat().contains(term)) && wished != *free;
+        let is_asked =
+            terms.iter().all(|term| TOGETHER.iter().any(|together| together.contains(term))) && wished != *free;
         if !is_asked || self.has_many_overlaps() {
             return Ok(false);
         }

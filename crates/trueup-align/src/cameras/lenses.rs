@@ -151,9 +151,7 @@ impl LensSearch<'_> {
         while bent.contains(&true) {
             wished.clone_from_slice(free);
             set_free(&mut wished, terms, &bent);
-            let model = IntrinsicsModel::grouped(group_of, &wished);
-            let coarse = problem.minimize(parameters.clone(), &model, COARSE_HUBER_PX, self.context)?;
-            let fine = problem.minimize(coarse, &model, FINE_HUBER_PX, self.context)?;
+            let fine = self.refined(parameters, group_of, &wished)?;
             let again = at(&fine, &wished, &bent, FINE_HUBER_PX).by_either();
             let denied =
                 problem.fine_costs(&fine).iter().zip(by_pinholes).any(|(after, before)| *after > DENIED * before);
@@ -172,6 +170,13 @@ impl LensSearch<'_> {
         Ok(bent)
     }
 
+    /// The cameras refined from coarse to fine with these terms free.
+    fn refined(&self, parameters: &Parameters, group_of: &[usize], free: &[FreeTerms]) -> Result<Parameters> {
+        let model = IntrinsicsModel::grouped(group_of, free);
+        let coarse = self.problem.minimize(parameters.clone(), &model, COARSE_HUBER_PX, self.context)?;
+        self.problem.minimize(coarse, &model, FINE_HUBER_PX, self.context)
+    }
+
     /// Which of the groups in `asked` have a lens that is off center, whatever it bends beside: those of which matches tell so. `parameters` are refined
     /// with it, `free` has it.
     fn off_center(
@@ -186,11 +191,12 @@ impl LensSearch<'_> {
         set_free(&mut open, &[RADIAL], asked);
         let ask = Ask { terms: &[CENTER, CENTER + 1], of: asked, huber_px: FINE_HUBER_PX };
         let mut told = self.told(self.problem, parameters, group_of, &open, &ask).by_matches;
+        if !told.contains(&true) {
+            return Ok(told);
+        }
         let mut wished = free.to_vec();
         set_free(&mut wished, &[RADIAL, CENTER, CENTER + 1], &told);
-        let model = IntrinsicsModel::grouped(group_of, &wished);
-        let coarse = self.problem.minimize(parameters.clone(), &model, COARSE_HUBER_PX, self.context)?;
-        let fine = self.problem.minimize(coarse, &model, FINE_HUBER_PX, self.context)?;
+        let fine = self.refined(parameters, group_of, &wished)?;
         if (0..told.len()).all(|group| !told[group] || self.is_visible(&fine, group_of, group)) {
             free.clone_from_slice(&wished);
             *parameters = fine;

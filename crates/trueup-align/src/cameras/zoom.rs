@@ -1,4 +1,4 @@
-//! Whether a lens was zoomed between photographs, as their own focal lengths tell.
+//! Whether a lens was zoomed between photographs, or its focus changed, as their own focal lengths tell.
 
 use trueup_core::{Result, StageContext};
 
