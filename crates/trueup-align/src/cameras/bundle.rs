@@ -82,6 +82,20 @@ impl BundleAdjustment<'_> {
         self.minimize_until(SETTLED, parameters, model, huber_px, context)
     }
 
+    /// [`Self::minimize`] where matches are far off at first, and then by those that are near.
+    ///
+    /// # Errors
+    /// As of [`Self::minimize`].
+    pub(super) fn coarse_to_fine(
+        &self,
+        parameters: Parameters,
+        model: &IntrinsicsModel,
+        context: &StageContext,
+    ) -> Result<Parameters> {
+        let coarse = self.minimize(parameters, model, COARSE_HUBER_PX, context)?;
+        self.minimize(coarse, model, FINE_HUBER_PX, context)
+    }
+
     /// [`Self::minimize`] until a step decreases the cost by less than `settled` of it.
     pub(super) fn minimize_until(
         &self,

@@ -149,6 +149,28 @@ impl IntrinsicsModel {
         held
     }
 
+    /// The same with `terms` free, too, of the photographs that are `asked`, common to those of a label.
+    pub(super) fn with_terms(&self, terms: &[usize], asked: &[bool], labels: &[usize]) -> Self {
+        let mut wider = self.clone();
+        for &term in terms {
+            let mut column_of: Vec<(usize, usize)> = Vec::new();
+            for ((of, &label), _) in wider.parameters_of.iter_mut().zip(labels).zip(asked).filter(|(_, asked)| **asked)
+            {
+                if of[term].is_some() {
+                    continue;
+                }
+                let known = column_of.iter().find(|(known, _)| *known == label).map(|&(_, column)| column);
+                let column = known.unwrap_or(wider.parameters);
+                if known.is_none() {
+                    column_of.push((label, column));
+                    wider.parameters += 1;
+                }
+                of[term] = Some(column);
+            }
+        }
+        wider
+    }
+
     /// The same with all focal lengths held fixed.
     pub(super) fn with_focal_held(&self) -> Self {
         let is_focal = |parameter: usize| self.parameters_of.iter().any(|of| of[FOCAL] == Some(parameter));
@@ -193,6 +215,12 @@ mod tests {
         let own = IntrinsicsModel::grouped(&[0, 1, 0], &free).with_own_focal();
         assert_eq!((own.parameters, [0, 1, 2].map(|k| own.parameters_of[k][FOCAL])), (6, [Some(3), Some(4), Some(5)]));
         assert_eq!([0, 1, 2].map(|k| own.parameters_of[k][RADIAL]), [Some(0), Some(1), Some(0)]);
+        // k2 of the first group and the last, each for itself; what is free already is not asked for, nor of whom nothing is.
+        let wider = own.with_terms(&[RADIAL, RADIAL + 1], &[true, true, false], &[7, 3, 7]);
+        let k2_of = |k: usize| wider.parameters_of[k][RADIAL + 1];
+        assert_eq!((wider.parameters, [0, 1, 2].map(k2_of)), (7, [Some(6), Some(2), None]));
+        let shared = own.with_terms(&[RADIAL + 1], &[true; 3], &[7, 3, 7]);
+        assert_eq!((shared.parameters, shared.parameters_of[2][RADIAL + 1]), (7, Some(6)));
         // What is held stays so.
         assert_eq!(held.with_own_focal().parameters, 3);
     }

@@ -151,7 +151,11 @@ impl LensSearch<'_> {
         while bent.contains(&true) {
             wished.clone_from_slice(free);
             set_free(&mut wished, terms, &bent);
-            let fine = self.refined(parameters, group_of, &wished)?;
+            let fine = self.problem.coarse_to_fine(
+                parameters.clone(),
+                &IntrinsicsModel::grouped(group_of, &wished),
+                self.context,
+            )?;
             let again = at(&fine, &wished, &bent, FINE_HUBER_PX).by_either();
             let denied =
                 problem.fine_costs(&fine).iter().zip(by_pinholes).any(|(after, before)| *after > DENIED * before);
@@ -168,13 +172,6 @@ impl LensSearch<'_> {
             bent = still;
         }
         Ok(bent)
-    }
-
-    /// The cameras refined from coarse to fine with these terms free.
-    fn refined(&self, parameters: &Parameters, group_of: &[usize], free: &[FreeTerms]) -> Result<Parameters> {
-        let model = IntrinsicsModel::grouped(group_of, free);
-        let coarse = self.problem.minimize(parameters.clone(), &model, COARSE_HUBER_PX, self.context)?;
-        self.problem.minimize(coarse, &model, FINE_HUBER_PX, self.context)
     }
 
     /// Which of the groups in `asked` have a lens that is off center, whatever it bends beside: those of which matches tell so. `parameters` are refined
@@ -196,7 +193,11 @@ impl LensSearch<'_> {
         }
         let mut wished = free.to_vec();
         set_free(&mut wished, &[RADIAL, CENTER, CENTER + 1], &told);
-        let fine = self.refined(parameters, group_of, &wished)?;
+        let fine = self.problem.coarse_to_fine(
+            parameters.clone(),
+            &IntrinsicsModel::grouped(group_of, &wished),
+            self.context,
+        )?;
         if (0..told.len()).all(|group| !told[group] || self.is_visible(&fine, group_of, group)) {
             free.clone_from_slice(&wished);
             *parameters = fine;

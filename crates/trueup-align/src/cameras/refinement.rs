@@ -3,7 +3,7 @@
 use trueup_core::lines::LineSegment;
 use trueup_core::{Result, StageContext};
 
-use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
+use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, Parameters};
 use super::expected_focal::{self, ExpectedFocal, OpenFocal};
 use super::intrinsics::IntrinsicsModel;
 use super::lenses::{FoundLenses, LensSearch, settings};
@@ -84,8 +84,7 @@ pub(super) fn refine(
     let mut per_picture_focal = options.focal_sharing == FocalSharing::PerPicture;
     let mut model = if per_picture_focal { own.clone() } else { shared.clone() };
 
-    let coarse = problem.minimize(start.clone(), &model, COARSE_HUBER_PX, context)?;
-    let mut fine = problem.minimize(coarse, &model, FINE_HUBER_PX, context)?;
+    let mut fine = problem.coarse_to_fine(start.clone(), &model, context)?;
     let search = LensSearch { problem: &problem, precise: &for_lenses, kind: options.kind_of_lens(), context };
     let find_lens = || match per_picture_focal {
         false => search.find(&fine, &CameraPrior::lens_groups(priors)),
@@ -101,8 +100,7 @@ pub(super) fn refine(
     if let Some(free) = free {
         let zoomed = if problem.is_sound(&free) { zoom::found(&problem, &model, &fine, &free) } else { None };
         if let Some(zoomed) = zoomed {
-            fine = problem.minimize(zoomed.start, &zoomed.model, COARSE_HUBER_PX, context)?;
-            fine = problem.minimize(fine, &zoomed.model, FINE_HUBER_PX, context)?;
+            fine = problem.coarse_to_fine(zoomed.start, &zoomed.model, context)?;
             unshared = Some(free);
             model = zoomed.model;
             per_picture_focal = true;
@@ -115,7 +113,7 @@ pub(super) fn refine(
             || unshared.as_ref().is_some_and(|own| zoom::fits_far_better(&problem, &shared, &lens.parameters, own));
         !per_picture_focal || cost(&lens.parameters) < cost(&fine) && !is_zoomed()
     };
-    let end = End { problem: &problem, for_lenses: &for_lenses, lines: input.lines, options, context };
+    let end = End { search: &search, lines: input.lines, options, context };
     if let Some(FoundLenses { parameters, model }) = with_lens.filter(explains_more) {
         return end.refined(Found { parameters, model, per_picture_focal: false });
     }
@@ -126,9 +124,9 @@ pub(super) fn refine(
         }
     }
     if problem.is_sound(&fine) {
-        let few = input.observations.pairs.len() < OVERLAPS_FOR_LENSES && !fine.has_lens();
+        let refined = end.refined(Found { parameters: fine.clone(), model, per_picture_focal })?;
+        let few = input.observations.pairs.len() < OVERLAPS_FOR_LENSES && !refined.parameters.has_lens();
         let lens_doubt_px = if few { search.doubt_px(&fine, &CameraPrior::lens_groups(priors)) } else { None };
-        let refined = end.refined(Found { parameters: fine, model, per_picture_focal })?;
         return Ok(Refined { lens_doubt_px, ..refined });
     }
     let parameters = with_expected_focal(&problem, start, context)?;
@@ -144,8 +142,7 @@ struct Found {
 
 /// What the cameras that were found are refined by in the end.
 struct End<'a> {
-    problem: &'a BundleAdjustment<'a>,
-    for_lenses: &'a BundleAdjustment<'a>,
+    search: &'a LensSearch<'a>,
     /// Line segments of each photograph.
     lines: &'a [Vec<LineSegment>],
     options: &'a CameraOptions,
@@ -156,10 +153,11 @@ impl End<'_> {
     /// What was found, with the focal lengths that are most probable where matches leave them open.
     fn refined(&self, found: Found) -> Result<Refined> {
         let Found { mut parameters, mut model, mut per_picture_focal } = found;
+        let problem = self.search.problem;
         let may_differ = self.options.focal_sharing == FocalSharing::Auto && parameters.focal_px.len() > 1;
         if may_differ
             && !per_picture_focal
-            && let Some(own) = zoom::refocused(self.problem, &model, &parameters, self.context)?
+            && let Some(own) = self.search.refocused(&model, &parameters)?
         {
             (parameters, model) = own;
             per_picture_focal = true;
@@ -169,9 +167,9 @@ impl End<'_> {
         let lines = if per_picture_focal { &[] } else { self.lines };
         let expected = match is_lens_told {
             true => None,
-            false => expected_focal::expected(self.problem, &parameters, &model, lines, self.options, self.context)?,
+            false => expected_focal::expected(problem, &parameters, &model, lines, self.options, self.context)?,
         };
-        let precise = if model.has_lens() { self.for_lenses } else { self.problem };
+        let precise = if model.has_lens() { self.search.precise } else { problem };
         let Some(ExpectedFocal { parameters: expected, opened }) = expected else {
             return Ok(Refined::of(precise.sharpened(parameters, &model, self.context)?, per_picture_focal));
         };
@@ -190,6 +188,5 @@ fn with_expected_focal(
     let focal_px: Vec<f64> = problem.priors.iter().map(CameraPrior::expected_focal_px).collect();
     let model = IntrinsicsModel::fixed(focal_px.len());
     let fixed = Parameters { focal_px, ..start.clone() };
-    let coarse = problem.minimize(fixed, &model, COARSE_HUBER_PX, context)?;
-    problem.minimize(coarse, &model, FINE_HUBER_PX, context)
+    problem.coarse_to_fine(fixed, &model, context)
 }

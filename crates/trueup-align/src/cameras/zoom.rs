@@ -1,12 +1,8 @@
 //! Whether a lens was zoomed between photographs, or its focus changed, as their own focal lengths tell.
 
-use trueup_core::{Result, StageContext};
-
-use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
+use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, Parameters};
 use super::intrinsics::{FOCAL, IntrinsicsModel, ZOOM_SPREAD};
-use super::lens_by_residual::{gaps, share_left};
 use super::pair_cost::pair_cost;
-use crate::evidence::CommonSquare;
 
 /// Share of the squared errors under a common focal length that those with focal lengths of their own may leave where few photographs differ. Parallax bends focal
 /// lengths, too, but leaves more. Measured over all overlaps, of which these are a part: in eight cut sets, where two to six of eight photographs are zoomed, 0.003 at most is
@@ -50,29 +46,6 @@ pub(super) fn found(
     Some(Zoomed { model: IntrinsicsModel::common(&labels), start })
 }
 
-/// Square of what neighboring matches err by alike, per axis, working pixels, from which on focal lengths of their own are asked for: ideal cameras leave less.
-const LEAST_COMMON: f64 = 0.1 * 0.1;
-/// Share of that square that focal lengths of their own may leave to be believed. Of nine sets cut with focal lengths that differ by 0.7 and 1.5 percent they leave 0.013 at most; of 229 photographed sets, pairs and
-/// triples that leave so much with a common one 0.066 at least.
-const MOST_LEFT_BY_FOCUS: f64 = 1.0 / 32.0;
-
-/// The cameras with a focal length for each photograph, and their model, where these leave next to nothing of what neighboring matches err by alike with `shared` ones: an
-/// automatic focus changes them by up to a percent or two from photograph to photograph. What differs by more was zoomed ([`found`]).
-pub(super) fn refocused(
-    problem: &BundleAdjustment<'_>,
-    model: &IntrinsicsModel,
-    shared: &Parameters,
-    context: &StageContext,
-) -> Result<Option<(Parameters, IntrinsicsModel)>> {
-    if CommonSquare::of_overlaps(&gaps(problem, shared)).sure() < LEAST_COMMON {
-        return Ok(None);
-    }
-    let own_model = model.with_own_focal();
-    let own = problem.minimize(shared.clone(), &own_model, FINE_HUBER_PX, context)?;
-    let is_focus = !differing(model, shared, &own).contains(&true);
-    Ok((is_focus && share_left(problem, shared, &own) <= MOST_LEFT_BY_FOCUS).then_some((own, own_model)))
-}
-
 /// Whether overlaps of photographs whose `own` focal lengths differ from the rest of their group fit far better by these than by the `shared` ones.
 pub(super) fn fits_far_better(
     problem: &BundleAdjustment<'_>,
@@ -89,8 +62,8 @@ pub(super) fn fits_far_better(
     differs.contains(&true) && cost_of_differing(own) < MAX_SHARE_LEFT * cost_of_differing(shared)
 }
 
-/// Which photographs' own focal lengths differ from the rest of their group.
-fn differing(model: &IntrinsicsModel, shared: &Parameters, own: &Parameters) -> Vec<bool> {
+/// Which photographs' `own` focal lengths differ from the rest of their group.
+pub(super) fn differing(model: &IntrinsicsModel, shared: &Parameters, own: &Parameters) -> Vec<bool> {
     let mut differs = vec![false; own.focal_px.len()];
     for of_group in focal_ratios(model, shared, own) {
         let middle = middle(&of_group);
