@@ -117,6 +117,23 @@ fn a_frame_does_not_guide_where_photographs_agree_on_a_better_one_out_of_reach()
     assert!(guidance.used && guidance.pooled, "{:?}", guidance.failed_clause);
 }
 
+/// Photographs whose own directions agree, but in a frame of which two axes are 10 degrees and more from all lines, so that what little fits turns its vertical by 11 and 13 degrees: the segments of all of them outvote it.
+#[test]
+fn directions_that_agree_are_outvoted_by_the_segments_of_all() {
+    let world = World::Manhattan { noise_deg: 0.3, bad_share: 0.0 };
+    for (tilt_deg, roll_deg, pitch_base_deg) in [(3.6_f64, 10_f64, 20.0), (4.5, 10.0, 0.0)] {
+        let sweep = Sweep { pitch_base_deg, roll_sd_deg: 4.0, count: 6, ..Sweep::default() };
+        let mut scene = with_lines(SyntheticScene::new(sweep, world, 0.0, 3), 0, 0.5);
+        let askew = rotation_about_x(tilt_deg.to_radians()) * rotation_about_z(roll_deg.to_radians());
+        for (triad, world_from_camera) in scene.triads.iter_mut().zip(&scene.world_from_camera) {
+            *triad = found(&(world_from_camera.transpose() * askew));
+        }
+        let prior = scene.prior(&SimilarityOptions::default());
+        assert!(prior.guidance.used && prior.guidance.pooled, "{:?}", prior.guidance.failed_clause);
+        assert!(max(&scene.errors_deg(&prior)) < 0.2, "{:?}", scene.errors_deg(&prior));
+    }
+}
+
 /// Photographs of a Manhattan world, all of them held rolled by as much, so that their row runs askew through it. Returns the guidance and the largest error of the rolls, degrees.
 fn held_rolled(count: usize, rolled_deg: f64, noise_deg: f64) -> (Guidance, f64) {
     let sweep = Sweep { count, roll_sd_deg: 1.0, ..Sweep::default() };
