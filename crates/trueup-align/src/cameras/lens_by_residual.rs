@@ -1,4 +1,4 @@
-//! Lenses that few overlaps tell by what they leave: nothing but noise.
+//! Lenses of few overlaps, and an automatic focus, told by what they leave: nothing but noise.
 //!
 //! Noise differs from match to match. Photographs from one place, through the right lens, leave nothing that neighboring matches err by alike. Parallax moves alike what is near together, and hardly ever
 //! as a lens does, so that some of that stays whichever lens is tried. Where this tells, the spread of the overlaps need not ([`super::lens_evidence`]), of which one or two have none.

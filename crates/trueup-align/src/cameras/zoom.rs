@@ -1,4 +1,4 @@
-//! Whether a lens was zoomed between photographs, or its focus changed, as their own focal lengths tell.
+//! Whether a lens was zoomed between photographs, as their own focal lengths tell.
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, Parameters};
 use super::intrinsics::{FOCAL, IntrinsicsModel, ZOOM_SPREAD};

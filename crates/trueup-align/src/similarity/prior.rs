@@ -14,7 +14,7 @@ pub struct Guidance {
     /// Whether lines guide the prior; otherwise straightening does.
     pub used: bool,
     /// Whether the frame guides that the segments of all photographs together stand for, since the photographs' own
-    /// directions did not agree.
+    /// directions did not agree, or were outvoted.
     pub pooled: bool,
     /// How far the best frame of the pooled search stands out, in standard deviations over all frames tried; `None`
     /// without enough segments.

@@ -266,8 +266,8 @@ impl<'a> SceneDirections<'a> {
         Some(dominant)
     }
 
-    /// The prior of the pooled search's frame, where segments fit it far better than the one that photographs agree on: few of these have many lines, of whose directions each alone may find others that
-    /// nearly agree with its neighbors'.
+    /// The prior of the pooled search's frame, where segments fit it far better than the one that photographs agree on: with few lines each may take others for
+    /// its directions that nearly agree with its neighbors'.
     fn outvoted(&mut self, pooled: &PooledFrames, own: &Dominant, before: &Guidance) -> Option<(Guidance, Upright)> {
         let frame = pooled.refined(&self.vote)?;
         let own = self.vote.refine_frame(&own.frame, AxisWeights::new(0, 1.0, 1.0));

@@ -210,7 +210,7 @@ pub struct ManhattanRecord {
     pub vertical_deviation_deg: Option<f64>,
     /// Whether vanishing points guided the panorama.
     pub accepted: bool,
-    /// Whether the lines of all photographs together guided it, since the photographs' own vanishing points did not agree.
+    /// Whether the lines of all photographs together guided it, since the photographs' own vanishing points did not agree, or were outvoted.
     #[serde(default)]
     pub pooled: bool,
     /// By how much the scene's level lines lie along a slope, degrees: these do not count. `None` where they agree with the upright ones.
