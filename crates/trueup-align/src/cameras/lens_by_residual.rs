@@ -37,7 +37,7 @@ const MOST_OFF_CENTER: f64 = 2.5;
 const PROMISING: f64 = 0.25;
 /// When the cameras of that look are near enough: a step that saves less than this share of the cost is the last.
 const NEARLY_SETTLED: f64 = 1e-4;
-/// The same where the step counts before have settled them: what explains anything does so at once.
+/// The same for a first look from cameras that have settled already: what explains anything does so in few steps.
 const HARDLY_SETTLED: f64 = 1e-2;
 /// A match that is farther off than so many times the median counts as if it were so far off: false ones have large errors, which nothing explains.
 const FARTHEST_IN_MEDIANS: f64 = 4.0;

@@ -18,6 +18,7 @@ mod input;
 mod level;
 mod options;
 mod path_voting;
+mod pooled;
 mod posterior;
 mod printed;
 mod prior;

@@ -7,7 +7,7 @@ use trueup_core::{Result, StageContext};
 
 use super::camera_correction::{corrected_rotations, relative_certainties};
 use super::dominant::{Dominant, dominant_frame};
-use super::gate::{Agreement, GateEvidence, allowed_divergence, allowed_of_level_lines, divergence, failed_clause};
+use super::gate::{Agreement, GateEvidence, allowed_divergence, divergence, failed_clause};
 use super::held::held_roll;
 use super::input::PriorInput;
 use super::level::{CameraLevel, LevelSource};
@@ -20,7 +20,7 @@ use super::upright::Upright;
 use super::vertical::{roll_of, vertical_by_reference, vertical_near, vertical_of};
 use super::vertical_vote::vertical_peak;
 use super::witnesses::{MIN_UPRIGHT_PHOTOGRAPHS, Reconciled, covariance_of_slopes, reconciled};
-use crate::vanishing::frame_search::{GUIDING_SIGNIFICANCE, PooledFrames, SEARCH_DEG, search_frames};
+use crate::vanishing::frame_search::{SEARCH_DEG, search_frames};
 use crate::vanishing::jackknife::{covariance_by_photographs, covariance_by_sectors, deviation};
 use crate::vanishing::joint::{self, AxisWeights, LineVote, Refinement};
 use crate::vanishing::{InterpretationPlanes, RefinedTriad};
@@ -37,11 +37,6 @@ const MAX_REFINEMENT_TOLERANCES: f64 = 2.0;
 /// Root mean square misorientation of the photographs' directions that is detection noise, degrees; beyond, the
 /// horizontal directions lose weight in the joint refinement.
 const ORDINARY_MISORIENTATION_DEG: f64 = 1.0;
-/// Photographs whose own directions must agree for lines of all together not to outvote them: one photograph agrees with itself.
-const MIN_AGREEING: usize = 2;
-/// How many times better segments of all photographs fit another frame than the one that photographs agree on, for it to be heard instead. Of 273 cut sets two have more and then guide, whose verticals are 0.04
-/// instead of 3.2 degrees off, and 0.04 instead of 0.03; those of 19 with 1.02 to 1.25 would differ by 0.08 at most; of 61 photographed sets none has more than 1.12.
-const OUTVOTED: f64 = 1.25;
 /// Least share of the information on the vertical that makes lines its guide; with less they are one voice among others.
 const GUIDING_SHARE: f64 = 0.5;
 /// Largest standard deviation of the vertical at which lines guide, degrees: so few photographs have lines beyond that what their scatter says of
@@ -54,14 +49,14 @@ const MAX_GRAVITY_ANGLE_DEG: f64 = 5.0;
 const MAX_GRAVITY_DEVIATIONS: f64 = 4.0;
 
 /// Everything known about the scene's directions.
-struct SceneDirections<'a> {
+pub(super) struct SceneDirections<'a> {
     input: &'a PriorInput<'a>,
     options: &'a SimilarityOptions,
     /// What is known of the vertical without lines.
-    level: &'a CameraLevel<'a>,
+    pub level: &'a CameraLevel<'a>,
     /// Per photograph its directions in the cameras' world.
-    triads: Vec<Option<Matrix3<f64>>>,
-    vote: LineVote,
+    pub triads: Vec<Option<Matrix3<f64>>>,
+    pub vote: LineVote,
 }
 
 /// What came of the lines.
@@ -101,7 +96,9 @@ pub(super) fn guide(
     let mut down = level.down;
     let (before, triads) = (guidance.clone(), scene.triads.clone());
     let is_agreed = dominant.is_some() && guidance.failed_clause.is_none();
-    let rivals = pooled.as_ref().zip(dominant.as_ref()).filter(|_| is_agreed && options.gate == GateMode::Full);
+    // The published gate knows no other frame than the one that the photographs agree on.
+    let pooled = pooled.filter(|_| options.gate == GateMode::Full).and_then(|pooled| scene.standing_out(&pooled));
+    let rivals = pooled.as_ref().zip(dominant.as_ref()).filter(|_| is_agreed);
     if let Some((guidance, upright)) = rivals.and_then(|(pooled, own)| scene.outvoted(pooled, own, &before)) {
         return Ok(Guided { guidance, upright: Some(upright), level: down });
     }
@@ -111,8 +108,7 @@ pub(super) fn guide(
             Err(level) => down = level,
         }
     }
-    // The published gate knows no other frame than the one that the photographs agree on.
-    if let Some(pooled) = pooled.filter(|_| options.gate == GateMode::Full) {
+    if let Some(pooled) = pooled {
         scene.triads = triads;
         let mut again = Guidance { failed_clause: guidance.failed_clause.clone(), ..before };
         if let Some(dominant) = scene.pooled(&pooled, dominant.as_ref(), &mut again) {
@@ -148,7 +144,7 @@ impl<'a> SceneDirections<'a> {
     }
 
     /// The vertical among the directions of `frame`.
-    fn vertical(&self, frame: &Matrix3<f64>) -> Vector3<f64> {
+    pub(super) fn vertical(&self, frame: &Matrix3<f64>) -> Vector3<f64> {
         match self.options.as_printed.vertical {
             true => vertical_by_reference(frame, &self.level.rotations[self.input.reference]),
             false if self.level.has_gravity => vertical_near(frame, &self.level.down),
@@ -169,7 +165,7 @@ impl<'a> SceneDirections<'a> {
     }
 
     /// Whether a search of all lines together about the cameras' vertical cannot find this one.
-    fn is_out_of_reach(&self, vertical: &Vector3<f64>) -> bool {
+    pub(super) fn is_out_of_reach(&self, vertical: &Vector3<f64>) -> bool {
         vertical.angle(&self.level.down) > SEARCH_DEG.to_radians()
     }
 
@@ -186,7 +182,7 @@ impl<'a> SceneDirections<'a> {
     }
 
     /// Photographs whose directions agree with `dominant`.
-    fn inliers(&self, dominant: &Dominant) -> Vec<usize> {
+    pub(super) fn inliers(&self, dominant: &Dominant) -> Vec<usize> {
         let agrees = |index: &usize| dominant.residuals[*index].is_some_and(|r| r <= self.options.rejection);
         (0..self.level.rotations.len()).filter(agrees).collect()
     }
@@ -239,71 +235,13 @@ impl<'a> SceneDirections<'a> {
         failed_clause(&evidence, self.options)
     }
 
-    /// The frame of the pooled search, if it stands out far enough: for where photographs agree on none, or on one that leaves the vertical open or
-    /// is refused.
-    fn pooled(&self, pooled: &PooledFrames, own: Option<&Dominant>, guidance: &mut Guidance) -> Option<Dominant> {
-        if pooled.significance < GUIDING_SIGNIFICANCE {
-            return None;
-        }
-        let frame = pooled.refined(&self.vote)?;
-        let down = self.vertical(&frame);
-        // What stands out so far is agreed on.
-        if self.level.angle_to(&down).is_some_and(|found| found.is_too_wide(Agreement::Close)) {
-            return None;
-        }
-        let allowed = allowed_of_level_lines(pooled.significance - GUIDING_SIGNIFICANCE);
-        if self.by_level_lines(&down).is_some_and(|deviations| deviations > allowed) {
-            return None;
-        }
-        if own.is_some_and(|own| self.is_outdone(&frame, own)) {
-            return None;
-        }
-        let residuals = self.triads.iter().map(|triad| triad.map(|triad| triad_residual(&frame, &triad))).collect();
-        let dominant = Dominant { frame, residuals };
-        guidance.pooled = true;
-        guidance.inliers = self.inliers(&dominant);
-        guidance.residuals.clone_from(&dominant.residuals);
-        Some(dominant)
-    }
-
-    /// The prior of the pooled search's frame, where segments fit it far better than the one that photographs agree on: with few lines each may take others for
-    /// its directions that nearly agree with its neighbors'.
-    fn outvoted(&mut self, pooled: &PooledFrames, own: &Dominant, before: &Guidance) -> Option<(Guidance, Upright)> {
-        let frame = pooled.refined(&self.vote)?;
-        let own = self.vote.refine_frame(&own.frame, AxisWeights::new(0, 1.0, 1.0));
-        if self.vote.fit(&frame) <= OUTVOTED * self.vote.fit(&own) {
-            return None;
-        }
-        let (triads, mut guidance) = (self.triads.clone(), before.clone());
-        let dominant = self.pooled(pooled, None, &mut guidance);
-        let upright = dominant.and_then(|dominant| self.solve_dominant(dominant, &mut guidance).ok());
-        if upright.is_none() {
-            self.triads = triads;
-        }
-        upright.map(|upright| (guidance, upright))
-    }
-
-    /// Whether segments fit another frame better that photographs agree on themselves and that the pooled search, which found `frame`, could not see:
-    /// its vertical is out of reach. Before a tower that fills photographs taken upward, what stands out within reach is a frame of the lines that
-    /// lie between its edges.
-    fn is_outdone(&self, frame: &Matrix3<f64>, own: &Dominant) -> bool {
-        if !self.is_out_of_reach(&self.vertical(&own.frame)) || self.inliers(own).len() < MIN_AGREEING {
-            return false;
-        }
-        let refined = self.vote.refine_frame(&own.frame, AxisWeights::new(0, 1.0, 1.0));
-        let down = self.vertical(frame);
-        let nearest = refined.column(column_near(&refined, &down)).into_owned();
-        let is_other = nearest.dot(&down).abs() < joint::TOLERANCE_DEG.to_radians().cos();
-        is_other && self.vote.fit(&refined) > self.vote.fit(frame)
-    }
-
     /// How many deviations of what is known without lines `down` lies from there, where too few photographs show lines along it; level ones alone may be those of a slope.
-    fn by_level_lines(&self, down: &Vector3<f64>) -> Option<f64> {
+    pub(super) fn by_level_lines(&self, down: &Vector3<f64>) -> Option<f64> {
         (self.vote.photographs_along(down) < MIN_UPRIGHT_PHOTOGRAPHS).then(|| self.level.deviations_to(down))
     }
 
     /// The prior of accepted dominant directions; where they are not sure enough to guide, the vertical that they take part in.
-    fn solve_dominant(
+    pub(super) fn solve_dominant(
         &mut self,
         mut dominant: Dominant,
         guidance: &mut Guidance,
@@ -584,7 +522,7 @@ fn horizontal_agreement(guidance: &Guidance) -> f64 {
 }
 
 /// The column of `frame` that lies nearest to a direction or its opposite.
-fn column_near(frame: &Matrix3<f64>, direction: &Vector3<f64>) -> usize {
+pub(super) fn column_near(frame: &Matrix3<f64>, direction: &Vector3<f64>) -> usize {
     frame.tr_mul(direction).iamax()
 }
 
