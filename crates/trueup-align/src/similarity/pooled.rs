@@ -64,16 +64,21 @@ impl SceneDirections<'_> {
     /// its directions that nearly agree with its neighbors'.
     pub(super) fn outvoted(
         &mut self,
-        pooled: &StandingOut,
+        pooled: &PooledFrames,
         own: &Dominant,
         before: &Guidance,
     ) -> Option<(Guidance, Upright)> {
+        // Most sets end here, before anything is refined.
+        if !pooled.outscores(&own.frame, &self.vote) {
+            return None;
+        }
+        let pooled = self.standing_out(pooled)?;
         let own = self.vote.refine_frame(&own.frame, AxisWeights::new(0, 1.0, 1.0));
         if self.vote.fit(&pooled.frame) <= OUTVOTED * self.vote.fit(&own) {
             return None;
         }
         let (triads, mut guidance) = (self.triads.clone(), before.clone());
-        let dominant = self.pooled(pooled, None, &mut guidance);
+        let dominant = self.pooled(&pooled, None, &mut guidance);
         let upright = dominant.and_then(|dominant| self.solve_dominant(dominant, &mut guidance).ok());
         if upright.is_none() {
             self.triads = triads;

@@ -97,7 +97,7 @@ pub(super) fn guide(
     let (before, triads) = (guidance.clone(), scene.triads.clone());
     let is_agreed = dominant.is_some() && guidance.failed_clause.is_none();
     // The published gate knows no other frame than the one that the photographs agree on.
-    let pooled = pooled.filter(|_| options.gate == GateMode::Full).and_then(|pooled| scene.standing_out(&pooled));
+    let pooled = pooled.filter(|_| options.gate == GateMode::Full);
     let rivals = pooled.as_ref().zip(dominant.as_ref()).filter(|_| is_agreed);
     if let Some((guidance, upright)) = rivals.and_then(|(pooled, own)| scene.outvoted(pooled, own, &before)) {
         return Ok(Guided { guidance, upright: Some(upright), level: down });
@@ -108,7 +108,7 @@ pub(super) fn guide(
             Err(level) => down = level,
         }
     }
-    if let Some(pooled) = pooled {
+    if let Some(pooled) = pooled.and_then(|pooled| scene.standing_out(&pooled)) {
         scene.triads = triads;
         let mut again = Guidance { failed_clause: guidance.failed_clause.clone(), ..before };
         if let Some(dominant) = scene.pooled(&pooled, dominant.as_ref(), &mut again) {

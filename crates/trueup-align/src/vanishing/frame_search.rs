@@ -44,11 +44,20 @@ pub(crate) struct PooledFrames {
     /// The best frame of each of the best verticals tried, the best first. Columns are the directions in the common frame, the vertical
     /// first; rotations.
     starts: Vec<Matrix3<f64>>,
+    /// Score of the first.
+    best: f64,
     /// Score of the first above the mean over all frames tried, in standard deviations of these.
     pub significance: f64,
 }
 
 impl PooledFrames {
+    /// Whether the first scores more than another frame by the same segments. What was found by steps rarely outscores a frame that is right.
+    pub(crate) fn outscores(&self, other: &Matrix3<f64>, vote: &LineVote) -> bool {
+        let tolerance = TOLERANCE_DEG.to_radians().sin();
+        let score = |(normal, weight): &(Vector3<f64>, f64)| weight * fit(other.tr_mul(normal).abs().min(), tolerance);
+        self.best > vote.longest(MAX_SEGMENTS).iter().map(score).sum()
+    }
+
     /// The frame that fits best of those that all segments refine, those of all three directions alike: what made a frame stand out is what
     /// it is known by. `None` without any.
     pub(crate) fn refined(&self, vote: &LineVote) -> Option<Matrix3<f64>> {
@@ -91,7 +100,8 @@ pub(crate) fn search_frames(vote: &LineVote, expected: &Vector3<f64>) -> Option<
     let mut order: Vec<usize> = (0..rings.len()).collect();
     order.sort_by(|&one, &other| rings[other].best.total_cmp(&rings[one].best));
     order.truncate(REFINED);
-    let significance = (rings[*order.first()?].best - mean) / variance.sqrt();
+    let best = rings[*order.first()?].best;
+    let significance = (best - mean) / variance.sqrt();
     let frame = |&index: &usize| {
         let vertical = verticals[index];
         let (first, second) = orthonormal_complement(&vertical);
@@ -99,7 +109,7 @@ pub(crate) fn search_frames(vote: &LineVote, expected: &Vector3<f64>) -> Option<
         let horizontal = first * cosine + second * sine;
         Matrix3::from_columns(&[vertical, horizontal, vertical.cross(&horizontal)])
     };
-    significance.is_finite().then(|| PooledFrames { starts: order.iter().map(frame).collect(), significance })
+    significance.is_finite().then(|| PooledFrames { starts: order.iter().map(frame).collect(), best, significance })
 }
 
 fn turn_of(index: usize) -> f64 {
@@ -118,8 +128,7 @@ fn ring(
     let mut scores = [0.0; TURNS];
     let mut common = 0.0;
     for (normal, weight) in segments {
-        let fit = |sine: f64| (1.0 - (sine / tolerance).powi(2)).max(0.0);
-        let upright = fit(normal.dot(vertical));
+        let upright = fit(normal.dot(vertical), tolerance);
         common += weight * upright;
         let (along, across) = (normal.dot(&first), normal.dot(&second));
         let (turn, half) =
@@ -130,7 +139,8 @@ fn ring(
         let mut place = from % TURNS;
         for _ in 0..(to - from).min(TURNS) {
             let (sine, cosine) = turns[place];
-            let level = fit((along * cosine + across * sine).abs().min((across * cosine - along * sine).abs()));
+            let nearest = (along * cosine + across * sine).abs().min((across * cosine - along * sine).abs());
+            let level = fit(nearest, tolerance);
             if level > upright {
                 scores[place] += weight * (level - upright);
             }
@@ -146,6 +156,11 @@ fn ring(
         }
     }
     ring
+}
+
+/// How well a segment fits a direction, by the sine of the angle between them and that of the tolerance: 1 to 0.
+fn fit(sine: f64, tolerance: f64) -> f64 {
+    (1.0 - (sine / tolerance).powi(2)).max(0.0)
 }
 
 /// The turn, but for quarters, of the horizontal directions that are orthogonal to a normal, or nearest to that, by its parts along the horizontal axes;
