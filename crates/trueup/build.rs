@@ -1,10 +1,11 @@
-//! Tells the program a number that changes with the stages whose results it may keep between runs or have from other programs.
+//! Tells the program a number that changes with the stages whose results it may keep between runs or have from other
+//! programs.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The sources that decide what is measured, matched and aligned, and what is handed to workers. Of a published crate, the others'
-/// are not beside it: there the version that they have in common tells them apart.
+/// The sources that decide what is measured, matched and aligned, and what is handed to workers. Of a published crate,
+/// the others' are not beside it: there the version that they have in common tells them apart.
 const SOURCES: [&str; 6] = [
     "../trueup-core/src",
     "../trueup-vision/src",

@@ -1,5 +1,5 @@
-//! libFuzzer on the target that `TRUEUP_FUZZ_TARGET` names when this is compiled. A panic is a finding, one that trueup contains as
-//! well; so are a crash, an input that takes longer than the limit, and one that takes more memory.
+//! libFuzzer on the target that `TRUEUP_FUZZ_TARGET` names when this is compiled. A panic is a finding, one that trueup
+//! contains as well; so are a crash, an input that takes longer than the limit, and one that takes more memory.
 #![no_main]
 
 use std::sync::OnceLock;

@@ -1,10 +1,10 @@
 //! How far overlaps are apart beyond the noise of what says so.
 //!
-//! Cameras, and the plain mesh after them, bring overlaps within a tenth of a pixel where the photographs were taken from
-//! one point, nearer than any single match or cell of pixels says. Drawn to each of these, overlaps would follow their
-//! noise. Noise differs from neighbor to neighbor; a true misalignment is common to them. The product of neighbors'
-//! distances is therefore, on the mean, the square of the true one, and evidence weighs by it, as the prior variance of
-//! what is estimated says in a Wiener filter.
+//! Cameras, and the plain mesh after them, bring overlaps within a tenth of a pixel where the photographs were taken
+//! from one point, nearer than any single match or cell of pixels says. Drawn to each of these, overlaps would follow
+//! their noise. Noise differs from neighbor to neighbor; a true misalignment is common to them. The product of
+//! neighbors' distances is therefore, on the mean, the square of the true one, and evidence weighs by it, as the prior
+//! variance of what is estimated says in a Wiener filter.
 
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -39,14 +39,18 @@ impl OverlapGap {
     }
 }
 
-/// The matches of an overlap, as ascending indices, without those that show things which moved if anything did: the farthest apart, of those beyond noise.
+/// The matches of an overlap, as ascending indices, without those that show things which moved if anything did: the
+/// farthest apart, of those beyond noise.
 ///
-/// Cameras that moved leave most of what they show a little apart. What moved itself lies far from where it was, and leaves all else where it is.
+/// Cameras that moved leave most of what they show a little apart. What moved itself lies far from where it was, and
+/// leaves all else where it is.
 pub(crate) fn still(gaps: &[OverlapGap]) -> impl Iterator<Item = usize> {
-    /// Distance up to which a match is taken for still, pixels: few matches of what stayed lie farther by their noise alone.
+    /// Distance up to which a match is taken for still, pixels: few matches of what stayed lie farther by their noise
+    /// alone.
     const NOISE_PX: f64 = 1.0;
-    /// The part of an overlap's matches that may have moved. Measured on 33 sets from one point into which people were drawn who walk through them: with a tenth, a fifth and this
-    /// much, what is left of 9, 2 and 1 seems to show parallax (of 23 with all), and of 60 photographed sets that of 50, 50 and 51 (51).
+    /// The part of an overlap's matches that may have moved. Measured on 33 sets from one point into which people were
+    /// drawn who walk through them: with a tenth, a fifth and this much, what is left of 9, 2 and 1 seems to show
+    /// parallax (of 23 with all), and of 60 photographed sets that of 50, 50 and 51 (51).
     const MOVED: f64 = 0.3;
     let mut farthest: Vec<usize> =
         (0..gaps.len()).filter(|&k| gaps[k].gap.norm_squared() > NOISE_PX * NOISE_PX).collect();
@@ -96,7 +100,8 @@ pub(crate) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
         .collect()
 }
 
-/// The nearest to one piece of evidence, at most so many, which lie `from_px` to [`FARTHEST_PX`] from it; in the order of their distance, on which sums depend.
+/// The nearest to one piece of evidence, at most so many, which lie `from_px` to [`FARTHEST_PX`] from it; in the order
+/// of their distance, on which sums depend.
 fn nearest<'a>(evidence: &'a [OverlapGap], one: &OverlapGap, from_px: f64, most: usize) -> Vec<&'a OverlapGap> {
     let near = from_px.powi(2)..FARTHEST_PX.powi(2);
     let mut found: Vec<(f64, &OverlapGap)> = evidence
@@ -112,11 +117,14 @@ fn nearest<'a>(evidence: &'a [OverlapGap], one: &OverlapGap, from_px: f64, most:
     found.into_iter().map(|(_, other)| other).collect()
 }
 
-/// Whether neighbors have more in common than noise would: the nearest of each alone, since what parallax leaves of overlaps that were drawn together changes its sign over a few cells.
+/// Whether neighbors have more in common than noise would: the nearest of each alone, since what parallax leaves of
+/// overlaps that were drawn together changes its sign over a few cells.
 pub(crate) fn is_beyond_noise(overlaps: &[Vec<OverlapGap>]) -> bool {
-    /// Neighbors that are asked of each. Measured on 61 photographed sets, 108 pairs and triples out of them and 191 cut sets from one place: eight or twelve tell these apart as well, two worse.
+    /// Neighbors that are asked of each. Measured on 61 photographed sets, 108 pairs and triples out of them and 191
+    /// cut sets from one place: eight or twelve tell these apart as well, two worse.
     const NEIGHBORS: usize = 4;
-    /// Standard errors that noise seldom comes to: of these 191 sets, of 50 whose shares alone say that parallax keeps them apart, 19 do, and 116 of 121 photographed ones.
+    /// Standard errors that noise seldom comes to: of these 191 sets, of 50 whose shares alone say that parallax keeps
+    /// them apart, 19 do, and 116 of 121 photographed ones.
     const NOISE: f64 = 1.5;
     let of_one = |evidence: &[OverlapGap], one: &OverlapGap| {
         nearest(evidence, one, NEAREST_PX, NEIGHBORS).iter().fold([0.0; 2], |[sum, squares], other| {
@@ -260,7 +268,8 @@ mod tests {
         assert!((found.sure() - 0.5).abs() < 0.06 && found.mean() > found.sure(), "{found:?}");
     }
 
-    /// Of a hundred matches, the eight that lie 2 to 9 px off are left out, and none within 1 px; where half lie 9 px off, three tenths of all, the later ones.
+    /// Of a hundred matches, the eight that lie 2 to 9 px off are left out, and none within 1 px; where half lie 9 px
+    /// off, three tenths of all, the later ones.
     #[test]
     fn the_farthest_beyond_noise_are_not_still() {
         let gaps = |far: &dyn Fn(usize) -> f64| -> Vec<OverlapGap> {
@@ -279,8 +288,8 @@ mod tests {
         assert_eq!(still(&[]).count(), 0);
     }
 
-    /// Four points 10 px apart in a square, 1 px off to the right: six products of 1, twelve axes, and a standard error of
-    /// the square root of six.
+    /// Four points 10 px apart in a square, 1 px off to the right: six products of 1, twelve axes, and a standard error
+    /// of the square root of six.
     #[test]
     fn a_few_neighbors_are_believed_with_caution() {
         let one = |x: f64, y: f64| OverlapGap {

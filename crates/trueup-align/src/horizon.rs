@@ -1,7 +1,7 @@
 //! Which longitudes photographs cover, and whether they show the horizon all round.
 //!
-//! A sphere is laid about the horizon where photographs show all of it, however far up or down most of them look, as a drone's do: the mesh
-//! and the projection both ask here.
+//! A sphere is laid about the horizon where photographs show all of it, however far up or down most of them look, as a
+//! drone's do: the mesh and the projection both ask here.
 
 use std::f64::consts::{PI, TAU};
 
@@ -46,7 +46,8 @@ impl Longitudes {
         }
     }
 
-    /// How much is covered, radians, a turn where there is no gap; and the middle of it, radians to the right of straight ahead, 0 of a turn.
+    /// How much is covered, radians, a turn where there is no gap; and the middle of it, radians to the right of
+    /// straight ahead, 0 of a turn.
     pub(crate) fn span_and_middle(&self) -> (f64, f64) {
         let (start, gap) = self.widest_gap();
         let span = TAU * (STEPS - gap) as f64 / STEPS as f64;
@@ -78,8 +79,8 @@ pub(crate) fn spread_pixels(size: Vector2<f64>, count: usize) -> impl Iterator<I
     (0..count * count).map(move |index| size.component_mul(&Vector2::new(share(index % count), share(index / count))))
 }
 
-/// Whether photographs (camera and size in its pixels) that show neither pole show directions near the horizon at every longitude. What shows a
-/// pole has all longitudes, but no horizon that goes round.
+/// Whether photographs (camera and size in its pixels) that show neither pole show directions near the horizon at every
+/// longitude. What shows a pole has all longitudes, but no horizon that goes round.
 pub(crate) fn goes_round_horizon<'a>(
     photographs: impl Iterator<Item = (&'a Camera, [f64; 2])>,
     level_from_world: &Matrix3<f64>,
@@ -121,7 +122,8 @@ mod tests {
         goes_round_horizon(cameras.iter().map(|camera| (camera, [800.0, 600.0])), level_from_world)
     }
 
-    /// The upper border of what looks down by 35 degrees lies 11.8 below the horizon, of what looks down by 50 it is 26.8.
+    /// The upper border of what looks down by 35 degrees lies 11.8 below the horizon, of what looks down by 50 it is
+    /// 26.8.
     #[test]
     fn what_looks_down_goes_round_while_it_shows_the_horizon() {
         let level = Matrix3::identity();

@@ -5,18 +5,20 @@ use trueup_core::geometry::{Homography, Normalization};
 
 /// Distance over which the influence of a match on a vertex falls to 1/e, working px: the published 8.5 squared.
 pub(crate) const DECAY_PX: f64 = 72.25;
-/// Share of the matches that a place takes which must be left of them beside slopes. Chosen on the photographed sets: with 0.5 and 1, pairs with few matches meet by a tenth
-/// to two fifths less well, with none a river below a skyline is carried by its skyline.
+/// Share of the matches that a place takes which must be left of them beside slopes. Chosen on the photographed sets:
+/// with 0.5 and 1, pairs with few matches meet by a tenth to two fifths less well, with none a river below a skyline is
+/// carried by its skyline.
 const LEAST_LEFT: f64 = 0.25;
 /// What is known of slopes besides, in matches a decay length away.
 const KNOWN_SLOPE: f64 = 0.01;
 /// Smallest weight of a match; it keeps vertices far from all matches determined.
 pub(crate) const WEIGHT_FLOOR: f64 = 0.0015;
 
-/// Whether at least so many matches tell of a place (source pixels): by the sum of their weights, each 1 at the place itself, of which [`LEAST_LEFT`]
-/// must be left beside the slopes that are fitted with it.
+/// Whether at least so many matches tell of a place (source pixels): by the sum of their weights, each 1 at the place
+/// itself, of which [`LEAST_LEFT`] must be left beside the slopes that are fitted with it.
 ///
-/// Matches along a skyline tell much of places on it and next to nothing of those above and below, wherever a homography may lead these. `least` is more than 0.
+/// Matches along a skyline tell much of places on it and next to nothing of those above and below, wherever a
+/// homography may lead these. `least` is more than 0.
 pub(crate) fn are_told_around(positions: &[Vector2<f64>], place: Vector2<f64>, least: f64) -> bool {
     /// Matches after which the sums are asked: seldom enough to cost nothing, often enough to end early.
     const ASKED_EVERY: usize = 32;
@@ -202,8 +204,9 @@ mod tests {
         assert!(at_least(told - 1e-12) && !at_least(told + 1e-12));
     }
 
-    /// Twenty matches along a line tell of its places, and of those beside it next to nothing: a slope across the line takes all but `KNOWN_SLOPE`. By hand of what is left
-    /// half a decay length aside, where the weights sum up to W: W - (W / 2)^2 / (W / 4 + 0.01) = 0.01 W / (W / 4 + 0.01), less than 0.04. In a field around a place all is left.
+    /// Twenty matches along a line tell of its places, and of those beside it next to nothing: a slope across the line
+    /// takes all but `KNOWN_SLOPE`. By hand of what is left half a decay length aside, where the weights sum up to W:
+    /// W - (W / 2)^2 / (W / 4 + 0.01) = 0.01 W / (W / 4 + 0.01), less than 0.04. In a field around a place all is left.
     #[test]
     fn matches_along_a_line_tell_nothing_beside_it() {
         let line: Vec<Vector2<f64>> = (0..20).map(|k| Vector2::new(10.0 * f64::from(k), 100.0)).collect();

@@ -2,14 +2,15 @@
 //!
 //! Cameras that only turn leave a residual in every overlap where the photographer moved. The solved mesh has aligned
 //! the overlaps as well as it could; which pixel of one photograph meets which pixel of another is read off it, and
-//! both are drawn in the same direction. First photographs step aside as evenly as they can, also where they are alone, so that
-//! lines stay straight (`smooth_steps`). What is left is drawn in a mean of the directions in which the photographs then
-//! see the place. Each weighs as deep as the place lies in it, so that nothing jumps where another one ends. The mesh's own
-//! shape, its plane and its drift over long rows are forgotten by this; only what it knows of overlaps remains, so that any
-//! mesh will do, of whatever method.
+//! both are drawn in the same direction. First photographs step aside as evenly as they can, also where they are alone,
+//! so that lines stay straight (`smooth_steps`). What is left is drawn in a mean of the directions in which the
+//! photographs then see the place. Each weighs as deep as the place lies in it, so that nothing jumps where another one
+//! ends. The mesh's own shape, its plane and its drift over long rows are forgotten by this; only what it knows of
+//! overlaps remains, so that any mesh will do, of whatever method.
 //!
 //! Near the poles of its sphere the mesh is off: photographs that look there cannot be unrolled, and pull at their
-//! neighbors. They are drawn as their cameras see, unless these err by more: where parallax is what their gentler parts tell.
+//! neighbors. They are drawn as their cameras see, unless these err by more: where parallax is what their gentler parts
+//! tell.
 //!
 //! # Source
 //! H.-Y. Shum and R. Szeliski, "Construction and refinement of panoramic mosaics with global and local alignment"
@@ -55,9 +56,9 @@ pub fn shifts(photographs: &[PosedPhotograph], period: Option<f64>, max_parallax
         .collect()
 }
 
-/// How far apart sights may be, as a share of the room that they have to meet in, the sum of their distances from their photographs' borders. Of
-/// photographs of 4:3 whose borders cross at a right angle, no place then moves by more than half a step against its neighbor a step aside:
-/// cells keep half of their width. From 0.6 on they would fold.
+/// How far apart sights may be, as a share of the room that they have to meet in, the sum of their distances from their
+/// photographs' borders. Of photographs of 4:3 whose borders cross at a right angle, no place then moves by more than
+/// half a step against its neighbor a step aside: cells keep half of their width. From 0.6 on they would fold.
 const MOST_PER_ROOM: f64 = 0.3;
 
 /// Photographs and what their mesh says of them.
@@ -90,8 +91,8 @@ impl<'a> Overlaps<'a> {
         overlaps
     }
 
-    /// The median angle in radians by which others see otherwise what photograph `k` shows where the mesh can be unrolled; 0 if there is nothing.
-    /// `down` is that of the mesh's sphere.
+    /// The median angle in radians by which others see otherwise what photograph `k` shows where the mesh can be
+    /// unrolled; 0 if there is nothing. `down` is that of the mesh's sphere.
     fn parallax(&self, k: usize, down: &Vector3<f64>) -> f64 {
         /// Pixels looked at along each side.
         const SAMPLES: usize = 17;
@@ -150,8 +151,8 @@ impl<'a> Overlaps<'a> {
 
     /// How another photograph sees the `place` that is expected in `direction`; `None` if it does not show it.
     fn sight(&self, number: usize, place: Vector2<f64>, direction: &Vector3<f64>) -> Option<Sight> {
-        /// How far outside of the other photograph the camera may expect the place for a look at the mesh, as a share of
-        /// its size.
+        /// How far outside of the other photograph the camera may expect the place for a look at the mesh, as a share
+        /// of its size.
         const ASIDE: f64 = 0.25;
         let other = &self.photographs[number];
         let expected = other.camera.project(other.camera.rotation() * direction)?;
@@ -177,7 +178,8 @@ impl<'a> Overlaps<'a> {
     }
 }
 
-/// Whether two boxes (lowest and highest coordinates) have a place in common, wherever on a plane that repeats after `period` in x.
+/// Whether two boxes (lowest and highest coordinates) have a place in common, wherever on a plane that repeats after
+/// `period` in x.
 fn meet(a: &(Vector2<f64>, Vector2<f64>), b: &(Vector2<f64>, Vector2<f64>), period: Option<f64>) -> bool {
     /// Pixels of the panorama that rounding cannot move a place by.
     const ROUNDING: f64 = 1e-3;
@@ -214,10 +216,11 @@ fn trust(steepest: f64) -> f64 {
     ((NONE_DEG - steepest.to_degrees()) / (NONE_DEG - WHOLE_DEG)).clamp(0.0, 1.0)
 }
 
-/// How surely it is `parallax` by which others see otherwise what a steep photograph shows, not what its mesh errs by, so that the mesh is believed.
+/// How surely it is `parallax` by which others see otherwise what a steep photograph shows, not what its mesh errs by,
+/// so that the mesh is believed.
 ///
-/// Of cut photographs from one point, that look up by 45 to 55 degrees and meet by their cameras alone, the mesh says 0.6 to 2e-4 radians; of steep
-/// photographs of churches and rooms, between which photographers moved, 14 to 100e-4.
+/// Of cut photographs from one point, that look up by 45 to 55 degrees and meet by their cameras alone, the mesh says
+/// 0.6 to 2e-4 radians; of steep photographs of churches and rooms, between which photographers moved, 14 to 100e-4.
 fn evidence(parallax: f64) -> f64 {
     /// Radians: no more than what meshes err by.
     const NONE: f64 = 3e-4;
@@ -237,8 +240,8 @@ fn room(photograph: &PosedPhotograph, depth: f64) -> f64 {
     0.5 * depth * photograph.mesh.width.min(photograph.mesh.height) / photograph.camera.focal_px
 }
 
-/// Where a place is drawn that is seen in the directions `seen`: their mean, faded towards the first as the cameras contradict
-/// each other. All photographs that see the place come to the same mean and the same fading.
+/// Where a place is drawn that is seen in the directions `seen`: their mean, faded towards the first as the cameras
+/// contradict each other. All photographs that see the place come to the same mean and the same fading.
 fn common_direction(sights: &[Sight], max_parallax: f64, seen: impl Fn(&Sight) -> Vector3<f64>) -> Vector3<f64> {
     let own = seen(&sights[0]);
     if sights.len() == 1 {
@@ -253,10 +256,12 @@ fn common_direction(sights: &[Sight], max_parallax: f64, seen: impl Fn(&Sight) -
     own.lerp(&mean, share).normalize()
 }
 
-/// Which share of the way sights go to their mean where photographs end beside each other; their directions are those `seen`.
+/// Which share of the way sights go to their mean where photographs end beside each other; their directions are those
+/// `seen`.
 ///
-/// Where the border of one photograph crosses that of another, what is drawn goes from what the one sees to what the other sees within any
-/// distance, however small: cells fold. So sights meet only where they have room for it, and are left apart nearer to the crossing.
+/// Where the border of one photograph crosses that of another, what is drawn goes from what the one sees to what the
+/// other sees within any distance, however small: cells fold. So sights meet only where they have room for it, and are
+/// left apart nearer to the crossing.
 fn room_to_meet(sights: &[Sight], seen: impl Fn(&Sight) -> Vector3<f64>) -> f64 {
     let room: f64 = sights.iter().map(|sight| sight.room).sum();
     let directions: Vec<Vector3<f64>> = sights.iter().map(seen).collect();
@@ -270,7 +275,8 @@ fn mean_direction(sights: &[Sight], seen: impl Fn(&Sight) -> Vector3<f64>) -> Op
     sights.iter().map(|sight| seen(sight) * sight.weight).sum::<Vector3<f64>>().try_normalize(f64::MIN_POSITIVE)
 }
 
-/// Which share of the way to their `mean` sights go, as far as they lie from it: 1 up to half of `max_parallax`, falling to 0 at all of it.
+/// Which share of the way to their `mean` sights go, as far as they lie from it: 1 up to half of `max_parallax`,
+/// falling to 0 at all of it.
 fn kept(sights: &[Sight], mean: &Vector3<f64>, max_parallax: f64) -> f64 {
     let counted = sights.iter().filter(|sight| sight.weight > 0.0);
     let farthest = counted.map(|sight| sight.direction.angle(mean)).fold(sights[0].direction.angle(mean), f64::max);
@@ -387,9 +393,9 @@ mod tests {
         assert!(trusts == [1.0; 2] && aside > 1.0, "{trusts:?}: {aside} px");
     }
 
-    /// Around the place where the upper border of one photograph crosses the right border of another, 10 pixels apart in what they see there: no
-    /// place moves by more than half a step against its neighbor, in any direction, and cells do not fold; away from there both are drawn at the
-    /// same place.
+    /// Around the place where the upper border of one photograph crosses the right border of another, 10 pixels apart
+    /// in what they see there: no place moves by more than half a step against its neighbor, in any direction, and
+    /// cells do not fold; away from there both are drawn at the same place.
     #[test]
     fn cells_do_not_fold_where_borders_cross() {
         const FOCAL_PX: f64 = 700.0;

@@ -7,8 +7,9 @@ use trueup_core::geometry::orthonormal_complement;
 /// Second eigenvalue of the mean moment of the x axes below which the photographs do not fix a vertical.
 const CONDITIONED: f64 = 0.05;
 
-/// Farthest that two photographs' level may lie from the mean of their y axes, degrees. Reasoned: the prior on the pitch takes the level of two
-/// that look up by 40 degrees, a third of a quarter turn apart, but half of the way from there.
+/// Farthest that two photographs' level may lie from the mean of their y axes, degrees. Reasoned: the prior on the
+/// pitch takes the level of two that look up by 40 degrees, a third of a quarter turn apart, but half of the way from
+/// there.
 const MAX_PAIR_ANGLE_DEG: f64 = 25.0;
 
 /// The vertical that the cameras' x axes span a plane orthogonal to.
@@ -48,16 +49,16 @@ pub(crate) fn straighten(rotations: &[Matrix3<f64>]) -> Straightened {
 
 /// Variance of the roll over that of the pitch among photographers, where none is told.
 ///
-/// On short sweeps with a roll of 5 degrees it divides the error of the vertical by about three; on full circles it changes little, since the pitch
-/// is common to all directions.
+/// On short sweeps with a roll of 5 degrees it divides the error of the vertical by about three; on full circles it
+/// changes little, since the pitch is common to all directions.
 pub(crate) const PITCH_PRIOR: f64 = 0.1;
 
 /// [`straighten`] for cameras that are expected to look level as well, though `pitch_prior` times less surely than not
 /// to be rolled: the eigenvector of least eigenvalue of sum x_i x_i^T + `pitch_prior` z_i z_i^T. The vertical in the
 /// common frame, pointing down.
 ///
-/// The x axes of two photographs contradict no direction: if one was rolled, what both are orthogonal to lies near the line of sight. Farther than
-/// [`MAX_PAIR_ANGLE_DEG`] from the mean of their y axes, that mean takes its place.
+/// The x axes of two photographs contradict no direction: if one was rolled, what both are orthogonal to lies near the
+/// line of sight. Farther than [`MAX_PAIR_ANGLE_DEG`] from the mean of their y axes, that mean takes its place.
 ///
 /// A prior of 0 yields [`straighten`].
 pub(crate) fn straighten_with_pitch(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Vector3<f64> {
@@ -118,7 +119,8 @@ mod tests {
 
     const PITCH_PRIOR: f64 = 0.1;
 
-    /// By symmetry the level of two photographs at the same place, of which one is rolled by 30 degrees, is rolled by 15.
+    /// By symmetry the level of two photographs at the same place, of which one is rolled by 30 degrees, is rolled
+    /// by 15.
     #[test]
     fn one_of_two_that_is_rolled_does_not_turn_down_into_the_scene() {
         let rotations = [Matrix3::identity(), rotation_about_z(30_f64.to_radians())];

@@ -106,7 +106,8 @@ fn mask(flag: &str, typed: &str, kind: MaskKind) -> Result<MaskFile, Failure> {
     }
 }
 
-/// Refuses one place for two files, or for one of the files that is read; `read` names those the library knows nothing of.
+/// Refuses one place for two files, or for one of the files that is read; `read` names those the library knows nothing
+/// of.
 pub(crate) fn check_files<'a>(
     outputs: &Outputs,
     read: impl IntoIterator<Item = (&'a Path, ReadFile)>,

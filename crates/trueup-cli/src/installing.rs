@@ -1,4 +1,5 @@
-//! `trueup completions` and `trueup manual`: what belongs to an installed command, from the declaration of its arguments.
+//! `trueup completions` and `trueup manual`: what belongs to an installed command, from the declaration of its
+//! arguments.
 
 use clap::{Command, CommandFactory};
 use clap_mangen::Man;

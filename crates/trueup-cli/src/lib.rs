@@ -1,7 +1,8 @@
 //! The `trueup` command: reads arguments, calls the `trueup` library, prints what it decided and why.
 //!
-//! No algorithm and no default lives here; [`trueup::StitchOptions`] holds every default. The command is a library too, so that
-//! other fronts can run it as it is ([`run`]) and say the same in the same words: [`summary_text`], [`batch_lines`], [`OPTION_FLAGS`].
+//! No algorithm and no default lives here; [`trueup::StitchOptions`] holds every default. The command is a library too,
+//! so that other fronts can run it as it is ([`run`]) and say the same in the same words: [`summary_text`],
+//! [`batch_lines`], [`OPTION_FLAGS`].
 #![forbid(unsafe_code)]
 
 mod arguments;
@@ -35,8 +36,8 @@ pub use arguments::{OPTION_FLAGS, OptionFlag};
 pub use batch::{batch_lines, batch_plan, run_batch};
 pub use stopping::end_without_memory;
 
-/// Runs the command with these arguments, of which the first is its own name, and returns its exit status. To be called once
-/// in a program: it catches Ctrl-C.
+/// Runs the command with these arguments, of which the first is its own name, and returns its exit status. To be called
+/// once in a program: it catches Ctrl-C.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let task = match CommandLine::try_parse_from(arguments) {
         Ok(command_line) => command_line.task,
@@ -68,8 +69,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
-/// What was made of which photographs, and why, as `trueup inspect` prints it; `verbose` adds every pair, photograph, note and
-/// stage.
+/// What was made of which photographs, and why, as `trueup inspect` prints it; `verbose` adds every pair, photograph,
+/// note and stage.
 pub fn summary_text(project: &Project, verbose: bool) -> String {
     summary::text(project, None, verbose)
 }

@@ -8,7 +8,8 @@ use trueup::Error;
 use crate::failure::Failure;
 use crate::words::printable;
 
-/// Writes `text` to standard output, without what would command a terminal. A reader that went away (`| head`) is no failure.
+/// Writes `text` to standard output, without what would command a terminal. A reader that went away (`| head`) is no
+/// failure.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(printable(text).as_bytes()).and_then(|()| stdout.flush()) {

@@ -19,8 +19,8 @@ pub(crate) fn cancel_token() -> Arc<CancelToken> {
     trueup_terminal::cancel_token("trueup", "", Ending::By(last_resort))
 }
 
-/// Has the program end by an error, with nothing half written, where Rust would abort it for want of memory. For a program
-/// whose allocator is [`trueup_terminal::NotingAllocator`], before anything else.
+/// Has the program end by an error, with nothing half written, where Rust would abort it for want of memory. For a
+/// program whose allocator is [`trueup_terminal::NotingAllocator`], before anything else.
 pub fn end_without_memory() {
     trueup_terminal::end_without_memory(WithoutMemory {
         say: |text, bytes| {

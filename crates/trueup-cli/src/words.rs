@@ -12,8 +12,8 @@ pub(crate) fn file_size(bytes: u64) -> String {
     }
 }
 
-/// `text` without what would command the terminal or turn the order of its letters: names of files may hold anything. Such
-/// characters are written as Rust writes them, `\u{1b}`; line ends and tabs are kept.
+/// `text` without what would command the terminal or turn the order of its letters: names of files may hold anything.
+/// Such characters are written as Rust writes them, `\u{1b}`; line ends and tabs are kept.
 ///
 /// # Source
 /// Unicode 16, general category Cc, and the explicit directional formatting characters of UAX #9.

@@ -93,8 +93,8 @@ fn every_set_is_stitched_once_and_a_bad_one_stops_nothing() {
     assert!(told.ends_with("3 panoramas of 4 sets, 1 is a single photograph: out/index.html\n"), "{told}");
 }
 
-/// A folder of photographs that is called like a file of the batch, and one whose set can be given no folder: both fail with what
-/// to do about it, the others are made, and the files of all sets tell so.
+/// A folder of photographs that is called like a file of the batch, and one whose set can be given no folder: both fail
+/// with what to do about it, the others are made, and the files of all sets tell so.
 #[test]
 fn a_set_that_can_have_no_folder_stops_nothing() {
     let desk = tree(1);
@@ -191,8 +191,8 @@ fn end(mut running: Child, signal: &str) -> Option<i32> {
     running.wait().expect("it ends").code()
 }
 
-/// Killed and stopped again and again, as early as a set is done, then shared by two runs of which one is killed: all is made,
-/// nothing twice, and as if nothing had happened.
+/// Killed and stopped again and again, as early as a set is done, then shared by two runs of which one is killed: all
+/// is made, nothing twice, and as if nothing had happened.
 #[cfg(unix)]
 #[test]
 fn a_batch_that_is_killed_goes_on_where_it_was_and_two_share_it() {
@@ -240,8 +240,8 @@ fn a_batch_that_is_killed_goes_on_where_it_was_and_two_share_it() {
     assert!(left.is_empty(), "{left:?}");
 }
 
-/// Runs a batch again as if a minute had passed: what a killed program was about to write into the folder of the whole batch, where
-/// others may be about to write as well, is stale by then.
+/// Runs a batch again as if a minute had passed: what a killed program was about to write into the folder of the whole
+/// batch, where others may be about to write as well, is stale by then.
 #[cfg(unix)]
 fn sweep_later(desk: &Desk) {
     let later = std::time::SystemTime::now() - Duration::from_secs(120);

@@ -62,7 +62,8 @@ fn without_code(line: &str) -> String {
     line.split('`').step_by(2).collect()
 }
 
-/// What links call the headings of a page: lower case, words joined by hyphens, without other punctuation, as GitHub and mdBook have it.
+/// What links call the headings of a page: lower case, words joined by hyphens, without other punctuation, as GitHub
+/// and mdBook have it.
 fn anchors(page: &str) -> BTreeSet<String> {
     let headings = prose(page).filter(|line| line.starts_with('#'));
     let anchor = |heading: &str| {

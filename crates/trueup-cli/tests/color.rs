@@ -58,7 +58,8 @@ fn a_wide_gamut_passes_through_unchanged() {
     }
 }
 
-/// Primaries that no picture has would make every photograph beside this one unlike it: the profile is not believed, and all are used.
+/// Primaries that no picture has would make every photograph beside this one unlike it: the profile is not believed,
+/// and all are used.
 #[test]
 fn an_absurd_profile_costs_no_photograph() {
     let desk = Desk::new();

@@ -105,7 +105,8 @@ fn panoramas_are_the_same_in_every_run_and_replace_older_ones() {
     assert!(run(&["--threads", "3"]) == first, "the panoramas differ");
     assert_eq!(files_in(&desk, "out"), files);
     assert!(first[2..].iter().all(|copy| first[..2].contains(copy)) && first[2] != first[3], "ranked are copies");
-    // Another comparison in the same place leaves nothing of the older one. It prints its record where that is asked for.
+    // Another comparison in the same place leaves nothing of the older one. It prints its record where that is asked
+    // for.
     let again = compare(&desk, &["--methods", "vpg", "--format", "png", "--scale", "0.2", "--json"]);
     let record = |text: &str| -> Value { serde_json::from_str(text).expect("JSON") };
     assert_eq!(record(again.expect_success()), record(&text(&desk, "out/compare.json")));

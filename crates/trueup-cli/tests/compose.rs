@@ -30,7 +30,8 @@ fn the_same_options_give_the_same_bytes() {
     assert_eq!(without_seconds("pano.json"), without_seconds("again.json"));
 }
 
-/// A panorama that was not cropped, because no rectangle keeps enough of it, has empty corners when it is composed again, too.
+/// A panorama that was not cropped, because no rectangle keeps enough of it, has empty corners when it is composed
+/// again, too.
 #[test]
 fn what_was_kept_whole_stays_as_it_was() {
     let desk = street_desk();
@@ -68,7 +69,8 @@ fn a_response_is_recorded() {
     assert_eq!(desk.json("again.json")["response"], json!([0.0, 0.0, 0.0, 0.0]));
 }
 
-/// Another shot of the same cameras, half as bright but for one photograph: with the recorded light it would be stripes.
+/// Another shot of the same cameras, half as bright but for one photograph: with the recorded light it would be
+/// stripes.
 #[test]
 fn another_shot_of_a_rig_is_lit_anew() {
     let desk = stitched();
@@ -174,8 +176,8 @@ fn views_and_what_lies_beside_a_panorama_come_out_as_stitched() {
     assert!(desk.read("again.jpg") == desk.read("third.jpg"), "from the cropped project");
 }
 
-/// A panorama that is cropped shows what the whole one shows there, and of the same photographs: seams, light and geometry are
-/// found before. Its record is that of the part, and holds the whole.
+/// A panorama that is cropped shows what the whole one shows there, and of the same photographs: seams, light and
+/// geometry are found before. Its record is that of the part, and holds the whole.
 #[test]
 fn a_crop_changes_nothing_but_the_frame() {
     let desk = stitched();
@@ -243,7 +245,8 @@ fn recorded_grids(project: &Value) -> (Vec<RecordedGrid>, [f64; 2]) {
 }
 
 /// Recorded grids lie where the panorama shows the photographs: on the perspective projection, on which the edge of a
-/// photograph is a straight line, their rows are straight; and on a cylinder, which shows all, they reach from end to end.
+/// photograph is a straight line, their rows are straight; and on a cylinder, which shows all, they reach from end to
+/// end.
 #[test]
 fn recorded_grids_are_those_of_the_panorama() {
     let desk = stitched();

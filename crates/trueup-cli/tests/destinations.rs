@@ -32,8 +32,8 @@ fn folders_that_take_no_files() {
     assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg"]);
 }
 
-/// Stitches with a limit on the size of files, which stops the writing half way, as a full disk does: that fails as `said`, and
-/// leaves the old panorama as it was and nothing behind.
+/// Stitches with a limit on the size of files, which stops the writing half way, as a full disk does: that fails as
+/// `said`, and leaves the old panorama as it was and nothing behind.
 #[cfg(target_os = "linux")]
 fn fails_on_a_full_disk(arguments: &str, said: &str) {
     let desk = street_desk();

@@ -8,8 +8,8 @@ use crate::run::{Desk, finish, trueup};
 
 const PAGE: &str = include_str!("../../../docs/command-line.md");
 
-/// What in a row of the page stands for anything: for what depends on counts of matches, and for lists that grow with what
-/// there is.
+/// What in a row of the page stands for anything: for what depends on counts of matches, and for lists that grow with
+/// what there is.
 const LEFT_OPEN: &str = " ...";
 
 /// A way to go wrong.
@@ -215,8 +215,8 @@ fn the_table_of_bad_inputs_is_what_is_printed() {
     assert_eq!(desk.files(), files, "nothing is left behind");
 }
 
-/// Rows of the page that other tests show: what takes a signal, a full disk or a file system of its own, and usage, which is told on
-/// several lines.
+/// Rows of the page that other tests show: what takes a signal, a full disk or a file system of its own, and usage,
+/// which is told on several lines.
 const SHOWN_ELSEWHERE: [&str; 9] = [
     "unreadable file",
     "socket, pipe or device",

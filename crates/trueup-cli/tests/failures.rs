@@ -50,7 +50,8 @@ fn a_photograph_of_eight_pixels() {
         .expect_failure(1, &["dot.jpg: 8 x 8 px are too few to stitch, each side needs 16"]);
 }
 
-/// A folder of photographs, one of whose names is none of text, is stitched; composed again, that one is found in its folder.
+/// A folder of photographs, one of whose names is none of text, is stitched; composed again, that one is found in its
+/// folder.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_project_of_a_name_that_is_not_utf8_says_what_to_do() {
@@ -68,7 +69,8 @@ fn a_project_of_a_name_that_is_not_utf8_says_what_to_do() {
     finish(trueup(desk.path(), &[&compose[..], &["--photos", "in"]].concat())).expect_success();
 }
 
-/// Beside the program's own photographs lies one whose name is none of text: a pattern and its folder find the others; named, it is named in the answer.
+/// Beside the program's own photographs lies one whose name is none of text: a pattern and its folder find the others;
+/// named, it is named in the answer.
 #[cfg(target_os = "linux")]
 #[test]
 fn names_that_are_not_utf8() {

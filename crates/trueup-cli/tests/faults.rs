@@ -1,8 +1,9 @@
-//! Faults on purpose: every call that makes, writes or renames a file fails once, memory and threads are refused, and the command is
-//! killed at any moment. What was there before is there or replaced as a whole, and nothing is left behind.
+//! Faults on purpose: every call that makes, writes or renames a file fails once, memory and threads are refused, and
+//! the command is killed at any moment. What was there before is there or replaced as a whole, and nothing is left
+//! behind.
 //!
-//! A library that is loaded before the command has the kernel hand back the calls (`faults.c`). Of many calls some are tried here,
-//! spread over all; with `TRUEUP_FAULTS=1000` as many of each command.
+//! A library that is loaded before the command has the kernel hand back the calls (`faults.c`). Of many calls some are
+//! tried here, spread over all; with `TRUEUP_FAULTS=1000` as many of each command.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -201,8 +202,8 @@ fn check_files(
     }
 }
 
-/// Makes calls for files fail, each in a run of its own. `bears` are the statuses beside that of an error with which a run may end that
-/// does without the file.
+/// Makes calls for files fail, each in a run of its own. `bears` are the statuses beside that of an error with which a
+/// run may end that does without the file.
 #[track_caller]
 fn check_files_fail(trial: &Trial, bears: &[i32]) {
     let (letters, whole) = trial.whole("files");
@@ -260,8 +261,9 @@ struct Tally {
     borne: usize,
 }
 
-/// Refuses calls of a kind that has nothing to do with files, each in a run of its own. A run ends by an error with status 1, or with one
-/// of `bears` if it does without; nothing is lost, half or left behind, but what a batch tells of work that did not come to an end.
+/// Refuses calls of a kind that has nothing to do with files, each in a run of its own. A run ends by an error with
+/// status 1, or with one of `bears` if it does without; nothing is lost, half or left behind, but what a batch tells of
+/// work that did not come to an end.
 #[track_caller]
 fn check_refusals(trial: &Trial, kind: &str, bears: &[i32]) {
     let (letters, whole) = trial.whole(kind);
@@ -278,8 +280,8 @@ fn check_refusals(trial: &Trial, kind: &str, bears: &[i32]) {
         let mut after = files(&desk);
         after.retain(|name, _| !name.ends_with("/at-work"));
         if ended.status != 1 {
-            // A photograph that could not be decoded is left out, which is said though `--quiet` is given; the panorama is that of the other
-            // then.
+            // A photograph that could not be decoded is left out, which is said though `--quiet` is given; the panorama
+            // is that of the other then.
             let is_whole = after.get("pano.png") == whole.get("pano.png");
             assert!(
                 is_whole || ended.stderr.contains("trueup: warning: "),
@@ -303,7 +305,8 @@ fn is_picture(bytes: &[u8]) -> bool {
     is_jpeg || image::load_from_memory(bytes).is_ok()
 }
 
-/// A megabyte or more of memory is refused once: the command ends by an error, wherever that was, unless a library does without.
+/// A megabyte or more of memory is refused once: the command ends by an error, wherever that was, unless a library does
+/// without.
 #[test]
 fn a_stitch_that_is_refused_memory_ends_by_an_error() {
     check_refusals(&STITCH, "memory", &[0]);
@@ -332,8 +335,8 @@ fn threads_that_do_not_start_cost_no_file() {
     }
 }
 
-/// Killed at a call for a file: each file is the old or the new one, and the next run comes to the same with nothing left behind. Where there is
-/// a cache, these calls are the end of each phase: before what it found is kept, and after.
+/// Killed at a call for a file: each file is the old or the new one, and the next run comes to the same with nothing
+/// left behind. Where there is a cache, these calls are the end of each phase: before what it found is kept, and after.
 #[track_caller]
 fn check_kills_at_calls(trial: &Trial) {
     let (letters, whole) = trial.whole("files");
@@ -341,7 +344,8 @@ fn check_kills_at_calls(trial: &Trial) {
     for fault in (1..=letters.len()).step_by(letters.len().div_ceil(tried()).max(1)) {
         let desk = trial.desk();
         let before = files(&desk);
-        // What a program that is killed leaves in the system's folder for temporary files is the system's to clear away.
+        // What a program that is killed leaves in the system's folder for temporary files is the system's to clear
+        // away.
         let temporary = Desk::new();
         let mut killed = command(&desk, trial.arguments, "kill", fault);
         let killed = killed.env("TMPDIR", temporary.path()).stderr(Stdio::null()).status().expect("it ends");
@@ -437,8 +441,8 @@ const KILLS_IN_A_ROW: usize = 4;
 /// Commands that are killed at any moment, which share the kills.
 const KILLED_AT_MOMENTS: usize = 4;
 
-/// Killed at moments spread over a whole run: each file is the old or the new one, a cache goes on to the same bytes, and what was not complete
-/// is gone.
+/// Killed at moments spread over a whole run: each file is the old or the new one, a cache goes on to the same bytes,
+/// and what was not complete is gone.
 #[track_caller]
 fn check_kills_at_moments(trial: &Trial) {
     let (_, whole) = trial.whole("files");

@@ -18,14 +18,15 @@ fn level(light: f32) -> u8 {
     (255.0 * encoded + 0.5).clamp(0.0, 255.0) as u8
 }
 
-/// The street's light, eight times that of its pictures where it is bright: what is white there has no light of its own.
+/// The street's light, eight times that of its pictures where it is bright: what is white there has no light of its
+/// own.
 fn street_light(number: usize) -> Vec<f32> {
     let brighter = |light: f32| light / (1.125 - light);
     street_pixels()[number].iter().map(|&one| brighter(light(one))).collect()
 }
 
-/// Puts three exposures of the first two photographs of the street into a folder, the first as it is and the others with a quarter and four
-/// times the light.
+/// Puts three exposures of the first two photographs of the street into a folder, the first as it is and the others
+/// with a quarter and four times the light.
 fn put_brackets(desk: &Desk) {
     for number in 0..2 {
         for (place, factor) in [1.0, 0.25, 4.0].into_iter().enumerate() {

@@ -8,9 +8,9 @@ use image::{DynamicImage, GenericImage, Rgba, RgbaImage};
 
 /// What two pictures of the same panorama may differ by on average, in levels of 255.
 ///
-/// Measured on the references: another seed of every random choice, as another machine's rounding may be, differs by 0.00 (and
-/// where it does by one level); `render.blend=none` in place of `multiband`, which differ least of the blend modes, by 0.29,
-/// the mesh with cells smaller by a tenth by 0.47.
+/// Measured on the references: another seed of every random choice, as another machine's rounding may be, differs by
+/// 0.00 (and where it does by one level); `render.blend=none` in place of `multiband`, which differ least of the blend
+/// modes, by 0.29, the mesh with cells smaller by a tenth by 0.47.
 const MEAN_TOLERANCE: f64 = 0.1;
 /// What all but a thousandth of the pixels may differ by: blend modes differ by 16 and more, a seam elsewhere by 14.
 const HIGH_TOLERANCE: f64 = 4.0;
@@ -76,7 +76,8 @@ fn difference(expected: Rgba<u8>, actual: Rgba<u8>) -> [u8; 4] {
     [channel(0), channel(1), channel(2), channel(3)]
 }
 
-/// The expected picture, the actual one and, if they have one size, their difference, enlarged; white where alpha differs.
+/// The expected picture, the actual one and, if they have one size, their difference, enlarged; white where alpha
+/// differs.
 pub(crate) fn side_by_side(expected: &RgbaImage, actual: &RgbaImage) -> RgbaImage {
     let mut pictures = vec![expected.clone(), actual.clone()];
     if expected.dimensions() == actual.dimensions() {

@@ -153,7 +153,8 @@ pub(crate) fn picture_size(path: &Path) -> (u32, u32) {
     image::image_dimensions(path).expect("a readable picture")
 }
 
-/// A small picture of 64 x 48 px as the first of a TIFF that says it is a Digital Negative and that the first is a copy.
+/// A small picture of 64 x 48 px as the first of a TIFF that says it is a Digital Negative and that the first is a
+/// copy.
 pub(crate) fn digital_negative() -> Vec<u8> {
     const FIRST_DIRECTORY: u32 = 8;
     let (width, height): (u32, u32) = (64, 48);

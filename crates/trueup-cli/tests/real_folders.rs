@@ -20,8 +20,8 @@ fn with_segment(jpeg: &[u8], marker: u8, content: &[u8]) -> Vec<u8> {
     [&jpeg[..2], &[0xff, marker], &length, content, &jpeg[2..]].concat()
 }
 
-/// Files of several pictures (MPO: CIPA DC-007, an index in a segment and the other pictures behind the first), and photographs with a video
-/// behind them, are their first picture.
+/// Files of several pictures (MPO: CIPA DC-007, an index in a segment and the other pictures behind the first), and
+/// photographs with a video behind them, are their first picture.
 #[test]
 fn multi_picture_files_and_motion_photographs_are_their_photograph() {
     let desk = street_desk();
@@ -37,7 +37,8 @@ fn multi_picture_files_and_motion_photographs_are_their_photograph() {
     }
 }
 
-/// A copy that was stopped before its last two bytes holds the whole photograph; one that was stopped earlier is left out.
+/// A copy that was stopped before its last two bytes holds the whole photograph; one that was stopped earlier is left
+/// out.
 #[test]
 fn a_jpeg_that_lacks_its_end_marker_alone_is_a_photograph() {
     let desk = street_desk();
@@ -116,8 +117,8 @@ fn put_developer(desk: &Desk) {
     std::fs::set_permissions(desk.join("bin/dcraw_emu"), std::fs::Permissions::from_mode(0o755)).expect("own file");
 }
 
-/// Camera raw is developed by the program that is installed, kept beside the panorama, and told; where there is none, or it cannot, it is
-/// left out as what it is.
+/// Camera raw is developed by the program that is installed, kept beside the panorama, and told; where there is none,
+/// or it cannot, it is left out as what it is.
 #[cfg(unix)]
 #[test]
 fn camera_raw_is_developed_by_a_program_that_is_installed() {

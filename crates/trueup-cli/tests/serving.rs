@@ -34,7 +34,8 @@ fn a_second_request_to_terminate_leaves_nothing_behind() {
     let desk = Desk::new();
     let (mut child, _) = served(&desk, ".");
     assert_eq!(desk.files().len(), 1, "its temporary files");
-    // The second comes before the server looks whether it is to stop, which it does ten times a second; later ones find nobody.
+    // The second comes before the server looks whether it is to stop, which it does ten times a second; later ones find
+    // nobody.
     let kill = format!("for i in 1 2 3 4 5; do kill -TERM {}; sleep 0.02; done 2>/dev/null; true", child.id());
     assert!(Command::new("sh").args(["-c", &kill]).status().expect("sh runs").success());
     assert_eq!(child.wait().expect("it ends").code(), Some(0), "as by one");

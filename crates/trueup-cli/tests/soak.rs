@@ -1,4 +1,5 @@
-//! Many runs: in one process they take no more memory than a few, and side by side on one cache they do not disturb each other.
+//! Many runs: in one process they take no more memory than a few, and side by side on one cache they do not disturb
+//! each other.
 
 use std::process::{Command, Stdio};
 
@@ -16,8 +17,8 @@ const VARIABLE: &str = "TRUEUP_SOAK";
 /// Share of the runs after which memory is to stand still: allocators keep what the first ones took.
 const SETTLED: f64 = 0.2;
 
-/// Most that memory may grow from there on, in bytes: a tenth of what one of these runs takes. A leak of a feature a run would be more
-/// after 500.
+/// Most that memory may grow from there on, in bytes: a tenth of what one of these runs takes. A leak of a feature a
+/// run would be more after 500.
 const MOST_GROWTH: u64 = 16 << 20;
 
 /// Programs at one cache.
@@ -81,8 +82,8 @@ fn many_runs_in_one_process_take_no_more_memory() {
     println!("{}", run.stdout);
 }
 
-/// Started at once on the same photographs, with an empty cache: all come to the same bytes, and to those without a cache; and what
-/// they left is whole.
+/// Started at once on the same photographs, with an empty cache: all come to the same bytes, and to those without a
+/// cache; and what they left is whole.
 #[test]
 fn eight_programs_at_one_cache_come_to_the_same_bytes() {
     let desk = street_desk();

@@ -21,8 +21,8 @@ fn photographs() -> &'static [Vec<u8>] {
     })
 }
 
-/// Sends signals, one soon after the other, while photographs are worked on; `script` starts the command by `exec "$@"`.
-/// Returns the exit status and what was said, and fails the test if anything is left behind.
+/// Sends signals, one soon after the other, while photographs are worked on; `script` starts the command by
+/// `exec "$@"`. Returns the exit status and what was said, and fails the test if anything is left behind.
 fn stopped_by(script: &str, signals: &[&str]) -> (Option<i32>, String) {
     let desk = Desk::new();
     for (name, bytes) in PHOTOGRAPHS.iter().zip(photographs()) {
@@ -54,7 +54,8 @@ fn ctrl_c_leaves_nothing_behind() {
     assert_eq!(stopped_by(PLAIN, &["INT"]), (Some(130), SAID.to_owned()));
 }
 
-/// A limit of the size of files fails the write that exceeds it, and does not end the command with its file half written.
+/// A limit of the size of files fails the write that exceeds it, and does not end the command with its file half
+/// written.
 #[test]
 fn a_file_that_may_not_grow_leaves_nothing_behind() {
     let desk = Desk::new();

@@ -66,7 +66,8 @@ fn an_edited_copy_is_left_out() {
     is_left_out(&desk, STREET, "edited.png", "it is b.jpg again, with other tones, compression or size");
 }
 
-/// Four pictures of parts of one that together show all of it, in the size of all: nothing but what they show tells which is the panorama.
+/// Four pictures of parts of one that together show all of it, in the size of all: nothing but what they show tells
+/// which is the panorama.
 #[test]
 fn a_panorama_of_a_cameras_format_is_left_out() {
     let desk = Desk::new();

@@ -32,6 +32,7 @@ mod run;
 #[cfg(unix)]
 mod serving;
 mod soak;
+mod sources;
 mod sphere;
 #[cfg(unix)]
 mod stopping;

@@ -7,7 +7,8 @@ use std::process::Command;
 use crate::pictures::{noise, put_street};
 use crate::run::{Desk, finish, trueup};
 
-/// A clip that shows each photograph of the street for three frames; `None` where ffmpeg is not installed, as `.ci/run` sees to.
+/// A clip that shows each photograph of the street for three frames; `None` where ffmpeg is not installed, as `.ci/run`
+/// sees to.
 fn clip() -> Option<Desk> {
     let desk = Desk::new();
     put_street(&desk);
@@ -109,7 +110,8 @@ fn a_damaged_video_is_left_out_as_a_damaged_photograph_is() {
     desk.stitch(&["bad.mp4"]).expect_failure(1, &["bad.mp4: it is a video, and ffmpeg cannot take its frames out"]);
 }
 
-/// A clip whose camera was turned upright on the way, as some telephones write it: its frames would be squeezed, and numbered twice.
+/// A clip whose camera was turned upright on the way, as some telephones write it: its frames would be squeezed, and
+/// numbered twice.
 #[test]
 fn a_video_whose_frames_change_their_size_is_refused() {
     let Some(desk) = clip() else { return };

@@ -34,12 +34,14 @@ pub struct PhotographGrid {
     pub lines: Vec<Polyline>,
 }
 
-/// Steps along a segment, in the photograph's working pixels: a bend of the grid's cells, which are about as large, shows.
+/// Steps along a segment, in the photograph's working pixels: a bend of the grid's cells, which are about as large,
+/// shows.
 const STEP_PX: f64 = 20.0;
 
 /// Line segments drawn over each photograph, the longest first: more make the photograph unreadable.
 const DRAWN_LINES: usize = 150;
-/// Grid lines drawn over each photograph in either direction, its borders among them: as many as can be followed by eye.
+/// Grid lines drawn over each photograph in either direction, its borders among them: as many as can be followed by
+/// eye.
 const DRAWN_GRID_LINES: usize = 13;
 
 /// The drawing of a panorama whose photographs were measured in `set`.

@@ -66,13 +66,13 @@ impl ComparisonEntry {
 
     /// The common options with this entry's departures.
     ///
-    /// Shapes are compared: with `projection.kind` at its default, the panorama is the mesh that was solved, unless the entry
-    /// itself says `projection.kind=auto`. A view chosen for the scene would show the cameras, which all entries have alike.
-    /// With `canvas.crop` at its default, all of the shape is shown, likewise.
+    /// Shapes are compared: with `projection.kind` at its default, the panorama is the mesh that was solved, unless the
+    /// entry itself says `projection.kind=auto`. A view chosen for the scene would show the cameras, which all entries
+    /// have alike. With `canvas.crop` at its default, all of the shape is shown, likewise.
     ///
     /// # Errors
-    /// [`Error::Input`] for a departure that cannot be, or that changes how photographs are measured and matched, which all
-    /// entries share; [`Error::Options`] for values out of range.
+    /// [`Error::Input`] for a departure that cannot be, or that changes how photographs are measured and matched, which
+    /// all entries share; [`Error::Options`] for values out of range.
     pub fn options(&self, common: &StitchOptions) -> Result<StitchOptions> {
         let mut options = common.clone();
         if options.arrange.projection.kind == Projection::Auto {

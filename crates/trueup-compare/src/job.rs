@@ -20,8 +20,8 @@ use super::place::{RECORD, check_replaceable, file_stems, refuse_photographs};
 use super::record::{COMPARISON_FORMAT, COMPARISON_VERSION, ComparedPhotograph, Comparison};
 use super::{figures, making, overlaps, ranking};
 
-/// Without a scale, the photographs are reduced so that they have about this many pixels together. Their overlaps make the
-/// panorama smaller than that.
+/// Without a scale, the photographs are reduced so that they have about this many pixels together. Their overlaps make
+/// the panorama smaller than that.
 const PAGE_PIXELS: f64 = 6e6;
 /// Largest panorama in pixels: a method that stretches the borders without end is reduced to it, and says so.
 const MAX_PIXELS: f64 = 24e6;
@@ -60,8 +60,8 @@ pub struct CompareJob {
     pub truth: Option<PathBuf>,
     /// Names of the entries to be ranked blindly; `None` leaves the choice to the program.
     pub ranked: Option<Vec<String>>,
-    /// Size of the panoramas relative to the reference photograph's own pixels, in place of `canvas.scale`; `None` chooses one
-    /// for all that suits a page.
+    /// Size of the panoramas relative to the reference photograph's own pixels, in place of `canvas.scale`; `None`
+    /// chooses one for all that suits a page.
     pub scale: Option<f64>,
     /// The panoramas' format.
     pub format: PanoramaFormat,
@@ -91,8 +91,8 @@ impl CompareJob {
     /// comparison of the same name is replaced then, any other folder is refused before work starts.
     ///
     /// # Errors
-    /// Those of [`Stitcher::match_photographs`] and of writing; [`Error::Input`] for a single photograph, and for entries, rankings, a truth or a folder
-    /// that cannot be; the first entry's error if all are refused.
+    /// Those of [`Stitcher::match_photographs`] and of writing; [`Error::Input`] for a single photograph, and for
+    /// entries, rankings, a truth or a folder that cannot be; the first entry's error if all are refused.
     pub fn run(&self, options: &StitchOptions, context: &StageContext, pages: &MakePages) -> Result<Comparison> {
         options.validate()?;
         if let Some(scale) = self.scale.filter(|scale| !SCALES.contains(scale)) {

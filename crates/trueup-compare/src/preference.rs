@@ -39,12 +39,12 @@ pub struct Preference {
     pub adjusted_p_value: f64,
 }
 
-/// The interval of a share of `successes` in `trials`; `None` without trials. Mean shares of several participants may give
-/// a broken number of successes.
+/// The interval of a share of `successes` in `trials`; `None` without trials. Mean shares of several participants may
+/// give a broken number of successes.
 ///
 /// # Source
-/// Wilson, "Probable inference, the law of succession, and statistical inference", 1927: unlike the mean with its standard
-/// error, it stays within 0 to 1 and holds for few participants and for shares near the ends.
+/// Wilson, "Probable inference, the law of succession, and statistical inference", 1927: unlike the mean with its
+/// standard error, it stays within 0 to 1 and holds for few participants and for shares near the ends.
 pub(crate) fn wilson_interval(successes: f64, trials: usize) -> Option<ShareInterval> {
     if trials == 0 {
         return None;
@@ -58,8 +58,8 @@ pub(crate) fn wilson_interval(successes: f64, trials: usize) -> Option<ShareInte
     Some(ShareInterval { low: (middle - half).max(0.0), high: (middle + half).min(1.0) })
 }
 
-/// Probability that of `agree + disagree` throws of a fair coin as many or more fall on one side as `agree` or `disagree`,
-/// whichever is larger: the two-sided exact sign test.
+/// Probability that of `agree + disagree` throws of a fair coin as many or more fall on one side as `agree` or
+/// `disagree`, whichever is larger: the two-sided exact sign test.
 ///
 /// # Source
 /// Conover, *Practical Nonparametric Statistics*, section on the sign test.
@@ -85,7 +85,8 @@ struct Said {
     below: usize,
 }
 
-/// Counts who prefers what: for every pair of methods and every participant, how often the one was ranked above the other.
+/// Counts who prefers what: for every pair of methods and every participant, how often the one was ranked above the
+/// other.
 #[derive(Debug, Default)]
 pub(crate) struct PairCounts<'a> {
     /// By the two methods, the first by name first, then by participant.
@@ -105,8 +106,8 @@ impl<'a> PairCounts<'a> {
         }
     }
 
-    /// The preferences, the surest first. A participant counts once in a pair, however many panoramas he ranked, since his
-    /// answers are not independent of each other.
+    /// The preferences, the surest first. A participant counts once in a pair, however many panoramas he ranked, since
+    /// his answers are not independent of each other.
     pub(crate) fn preferences(self) -> Vec<Preference> {
         let mut found: Vec<Preference> = self.said.into_iter().map(|(pair, said)| preference(pair, &said)).collect();
         found.sort_by(|one, two| one.p_value.total_cmp(&two.p_value).then(one.preferred.cmp(&two.preferred)));
@@ -206,7 +207,8 @@ mod tests {
         ranking
     }
 
-    /// The paper's study: 20 participants rank 4 methods on 20 groups; the one is drawn 4 times as readily as any other.
+    /// The paper's study: 20 participants rank 4 methods on 20 groups; the one is drawn 4 times as readily as any
+    /// other.
     #[test]
     fn a_simulated_study_finds_the_preference_that_is_there_and_no_other() {
         let weights = [("aanap", 1.0), ("gsp-2d", 1.0), ("gsp-3d", 1.0), ("vpg", 4.0)];
@@ -226,8 +228,8 @@ mod tests {
         assert!(found[..3].iter().all(|one| one.preferred == "vpg"));
     }
 
-    /// Without a preference, a test at 5 % finds one in no more than 5 of 100 studies, and the interval of the share holds
-    /// the true one half in about 95 of 100. Of 1000 studies, three standard deviations are 2 %.
+    /// Without a preference, a test at 5 % finds one in no more than 5 of 100 studies, and the interval of the share
+    /// holds the true one half in about 95 of 100. Of 1000 studies, three standard deviations are 2 %.
     #[test]
     fn intervals_and_tests_err_as_often_as_they_say() {
         let mut generator = StageContext::default().generator("votes", 2);

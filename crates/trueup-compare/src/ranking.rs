@@ -58,8 +58,8 @@ pub(crate) fn check_wanted(wanted: &[String], entries: &[ComparisonEntry]) -> Re
     }
 }
 
-/// Chooses and shuffles the panoramas of the ranking: those wanted, else those of the paper's study, else the first, each
-/// as far as it succeeded. `None` for fewer than two. The order derives from the context's seed.
+/// Chooses and shuffles the panoramas of the ranking: those wanted, else those of the paper's study, else the first,
+/// each as far as it succeeded. `None` for fewer than two. The order derives from the context's seed.
 pub(crate) fn choose(
     wanted: Option<&[String]>,
     entries: &[Compared],

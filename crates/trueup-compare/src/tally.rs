@@ -93,8 +93,8 @@ pub struct MethodScore {
 /// Reads a file of results.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is none, damaged, of a later version, or a ranking in it names
-/// an entry twice or too few or too many.
+/// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is none, damaged, of a later version, or a ranking in it
+/// names an entry twice or too few or too many.
 pub fn read_rankings(path: &Path) -> Result<RankingResults> {
     let bytes = trueup_io::text::read(path).map_err(|error| Error::io("reading", path, error))?;
     parse(&bytes, &path.display().to_string())
@@ -138,8 +138,8 @@ struct Scores {
     ranks: [usize; MAX_RANKED],
 }
 
-/// Sums up results. Participants are told apart by their names, without regard to case and outer spaces; an answer without
-/// a name is a participant of its own.
+/// Sums up results. Participants are told apart by their names, without regard to case and outer spaces; an answer
+/// without a name is a participant of its own.
 ///
 /// # Errors
 /// [`Error::Input`] if there are no answers.

@@ -54,8 +54,8 @@ const BAND_ROWS: usize = 32;
 impl Coverage {
     /// The pixels that lie wholly inside of at least one photograph's grid.
     ///
-    /// A grid's outline is followed along the pixel row's upper and lower edge and through its middle; between these, it is taken
-    /// as straight. Time grows with rows and cells, not with pixels.
+    /// A grid's outline is followed along the pixel row's upper and lower edge and through its middle; between these,
+    /// it is taken as straight. Time grows with rows and cells, not with pixels.
     pub fn of(layout: &CanvasLayout) -> Self {
         let (layout, _) = layout.unrolled(0);
         let (width, height) = (layout.width, layout.height);
@@ -157,7 +157,8 @@ impl Coverage {
     /// The largest rectangle of covered pixels, the topmost and leftmost of equal ones; empty if nothing is covered.
     ///
     /// Heights of covered columns above each row, and the largest rectangle under their outline by a stack: a few
-    /// operations a pixel. Rows whose columns all go on below cannot be a largest rectangle's last, and are only counted.
+    /// operations a pixel. Rows whose columns all go on below cannot be a largest rectangle's last, and are only
+    /// counted.
     pub fn largest_rectangle(&self) -> Rectangle {
         let mut best = Rectangle { columns: 0..0, rows: 0..0 };
         let mut heights = vec![0_usize; self.width];

@@ -188,8 +188,8 @@ impl DeformedGrid {
         }
     }
 
-    /// Where the line y = `line` lies within the grid: disjoint ascending stretches that do not touch, from `candidates` (see
-    /// [`Self::cells_in_rows`]).
+    /// Where the line y = `line` lies within the grid: disjoint ascending stretches that do not touch, from
+    /// `candidates` (see [`Self::cells_in_rows`]).
     pub(crate) fn covered_along(&self, line: f64, candidates: &[u32]) -> Vec<[f64; 2]> {
         /// Cells that share an edge meet at the same crossing; this allows for edges that only nearly coincide.
         const TOUCHING_PX: f64 = 1e-6;
@@ -214,8 +214,8 @@ impl DeformedGrid {
 }
 
 impl DeformedGrid {
-    /// Tells `found` of every canvas pixel in `columns` and `rows` that a cell covers: (x, y), the place in the photograph
-    /// that its center shows, and the pixel's size there.
+    /// Tells `found` of every canvas pixel in `columns` and `rows` that a cell covers: (x, y), the place in the
+    /// photograph that its center shows, and the pixel's size there.
     pub(crate) fn each_place(
         &self,
         columns: &Range<usize>,

@@ -1,7 +1,7 @@
 //! Distances to the border of what is covered.
 
-/// Distance of every pixel of a picture `width` pixels wide to the nearest one that is not `covered`, or to the picture's
-/// border, in thirds of a pixel: straight steps of 3 and diagonal ones of 4; 0 where nothing is covered.
+/// Distance of every pixel of a picture `width` pixels wide to the nearest one that is not `covered`, or to the
+/// picture's border, in thirds of a pixel: straight steps of 3 and diagonal ones of 4; 0 where nothing is covered.
 ///
 /// # Source
 /// Borgefors, "Distance transformations in digital images", CVGIP 34, 1986.

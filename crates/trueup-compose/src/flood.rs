@@ -1,7 +1,7 @@
 //! How far one place lies from others, step by step.
 
-/// Rounds of going on from a front to what lies `beside` it, until nothing more is reached; 0 if the front is empty. What `is_reached` already is not
-/// entered.
+/// Rounds of going on from a front to what lies `beside` it, until nothing more is reached; 0 if the front is empty.
+/// What `is_reached` already is not entered.
 pub(crate) fn rounds<Beside: Iterator<Item = usize>>(
     mut front: Vec<usize>,
     is_reached: &mut [bool],

@@ -44,8 +44,8 @@ pub(crate) const FRAME_REACH: f64 = 1.0;
 /// Cells of the small canvas on which voids are sought, at most: their outline is smooth between them.
 const MOST_CELLS: usize = 1 << 20;
 
-/// Radii around the middle of a disc that are void: with sqrt(2), corners that a disc does not fill are no gaps either; the
-/// rest is what chamfer distances are off.
+/// Radii around the middle of a disc that are void: with sqrt(2), corners that a disc does not fill are no gaps either;
+/// the rest is what chamfer distances are off.
 const CORNER: f32 = 1.5;
 
 /// [`border_distances`] counts in thirds of a pixel.
@@ -63,10 +63,10 @@ impl Gaps {
     /// The small gaps of a canvas; `fill` is a radius in photographs' sides, see
     /// [`CanvasOptions::fill`](crate::layout::CanvasOptions).
     ///
-    /// A void is all that a disc of this radius reaches which lies wholly in what is not covered, with the corners beside it,
-    /// and all that lies farther than twice the radius from every photograph; a gap is the rest. So notches, slits and ragged or wavy borders up to
-    /// twice as wide as the radius are gaps, whatever they are joined to. Discs do not reach out of the canvas: a strip along
-    /// its border is as wide as it is.
+    /// A void is all that a disc of this radius reaches which lies wholly in what is not covered, with the corners
+    /// beside it, and all that lies farther than twice the radius from every photograph; a gap is the rest. So notches,
+    /// slits and ragged or wavy borders up to twice as wide as the radius are gaps, whatever they are joined to. Discs
+    /// do not reach out of the canvas: a strip along its border is as wide as it is.
     pub fn find(layout: &CanvasLayout, coverage: Coverage, fill: f64) -> Self {
         let (width, height) = (layout.width, layout.height);
         let radius = fill * layout.photograph_side();
@@ -117,7 +117,8 @@ impl Gaps {
         self.coverage.covered(columns, y)
     }
 
-    /// The stretches of `columns` in row `y` that no photograph covers, or none wholly, in ascending order; some are empty.
+    /// The stretches of `columns` in row `y` that no photograph covers, or none wholly, in ascending order; some are
+    /// empty.
     pub(crate) fn uncovered(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Range<usize>> {
         self.coverage.uncovered(columns, y)
     }
@@ -192,8 +193,8 @@ impl Gaps {
     }
 }
 
-/// Pixels, at most, from what is not covered of a rectangle to what is; 0 if nothing is covered. `is_turn` if its last column lies beside the
-/// first.
+/// Pixels, at most, from what is not covered of a rectangle to what is; 0 if nothing is covered. `is_turn` if its last
+/// column lies beside the first.
 fn deepest(coverage: &Coverage, rectangle: &Rectangle, is_turn: bool) -> f64 {
     /// Cells that the rectangle is looked at in, at most: a distance need not be exact.
     const CELLS: usize = 1 << 14;

@@ -3,8 +3,8 @@
 /// Adding 1.5 * 2^23 rounds to a whole number and leaves it in the low bits: cheaper than a checked cast.
 pub(crate) const ROUNDING: f32 = 12_582_912.0;
 
-/// A curve by its values at the whole numbers from 0 on, straight between them. The number of entries is a power of two, so that
-/// reading one needs no check.
+/// A curve by its values at the whole numbers from 0 on, straight between them. The number of entries is a power of
+/// two, so that reading one needs no check.
 #[derive(Debug)]
 pub(crate) struct LinearTable<const ENTRIES: usize> {
     /// A value, and the difference to the next.

@@ -7,9 +7,10 @@
 //!
 //! # Departures
 //! Arcs are stored by direction, with their nodes. Capacities are whole numbers, so that the cut is exact and the same
-//! everywhere. A large network is first cut in two that know nothing of each other, each on a core of its own; their flows are
-//! one of the whole, and their trees go on growing there (J. Liu and J. Sun, "Parallel graph-cuts by adaptive bottom-up
-//! merging", CVPR 2010). Of all maximum flows the nodes from which the sink can still be reached are the same, and so is the cut.
+//! everywhere. A large network is first cut in two that know nothing of each other, each on a core of its own; their
+//! flows are one of the whole, and their trees go on growing there (J. Liu and J. Sun, "Parallel graph-cuts by adaptive
+//! bottom-up merging", CVPR 2010). Of all maximum flows the nodes from which the sink can still be reached are the
+//! same, and so is the cut.
 
 use std::collections::VecDeque;
 
@@ -37,8 +38,8 @@ const WORTH_HALVING: usize = 4096;
 /// What is looked at together lies in arrays of its own: most of the time goes into walking along the trees.
 #[derive(Debug, Default)]
 pub(crate) struct GridFlow {
-    /// Residual capacity from the source (above zero) or to the sink (below zero). The first node of this and all that follow is
-    /// [`NOWHERE`].
+    /// Residual capacity from the source (above zero) or to the sink (below zero). The first node of this and all that
+    /// follow is [`NOWHERE`].
     excess: Vec<i32>,
     /// Residual capacities to the four neighbors.
     residual: Vec<[i32; 4]>,
@@ -60,8 +61,8 @@ pub(crate) struct GridFlow {
     other_half: Option<Box<Self>>,
 }
 
-/// An arc between the two halves: a node of each as they are numbered in the whole network, the direction from the first
-/// to the second, and the capacities there and back.
+/// An arc between the two halves: a node of each as they are numbered in the whole network, the direction from the
+/// first to the second, and the capacities there and back.
 struct ArcBetween {
     nodes: [u32; 2],
     direction: usize,
@@ -91,8 +92,8 @@ impl GridFlow {
         self.excess[node] = self.excess[node].saturating_add(amount);
     }
 
-    /// Makes it cost `there` to have a node on the source's side and the `other`, its neighbor in `direction`, on the sink's, and
-    /// `back` for the reverse; both at least 0.
+    /// Makes it cost `there` to have a node on the source's side and the `other`, its neighbor in `direction`, on the
+    /// sink's, and `back` for the reverse; both at least 0.
     pub(crate) fn add_arcs(&mut self, [node, other]: [usize; 2], direction: usize, there: i32, back: i32) {
         // Nodes are numbered by 32 bits where pixels are.
         self.neighbors[node][direction] = other as u32;
@@ -101,8 +102,8 @@ impl GridFlow {
         self.residual[other][direction ^ 2] += back;
     }
 
-    /// Adds what a seam costs between two neighbors that may both change: `keep_both` while neither does, `second_changes` and `first_changes` if one
-    /// alone does; nothing if both do. Who changes is on the sink's side.
+    /// Adds what a seam costs between two neighbors that may both change: `keep_both` while neither does,
+    /// `second_changes` and `first_changes` if one alone does; nothing if both do. Who changes is on the sink's side.
     ///
     /// # Source
     /// Kolmogorov, Zabih, "What energy functions can be minimized via graph cuts?", IEEE TPAMI 26(2), 2004, section 4.
@@ -170,8 +171,8 @@ impl GridFlow {
         arcs
     }
 
-    /// Takes back the half that is `other`'s, solved as this one is, and the `arcs` between the two, across which their trees
-    /// go on growing.
+    /// Takes back the half that is `other`'s, solved as this one is, and the `arcs` between the two, across which their
+    /// trees go on growing.
     fn join_with(&mut self, other: &Self, arcs: &[ArcBetween]) {
         let offset = self.excess.len() as u32 - 1;
         let moved = |&node: &u32| if node == NOWHERE { NOWHERE } else { node + offset };
@@ -496,8 +497,8 @@ mod tests {
         }
     }
 
-    /// The sides of a grid of pseudorandom costs, large enough to be halved twice, as its halves have them together and as one
-    /// network has them.
+    /// The sides of a grid of pseudorandom costs, large enough to be halved twice, as its halves have them together and
+    /// as one network has them.
     #[test]
     fn halves_find_the_same_cut() {
         const SIDE: usize = 100;

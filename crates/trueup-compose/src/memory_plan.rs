@@ -50,8 +50,8 @@ pub(crate) struct MemoryPlan {
 /// Bytes of a pixel of a photograph that was not decoded yet: 8 bits, four channels.
 const UNKNOWN_PIXEL_BYTES: usize = 4;
 
-/// A photograph on its way into memory takes this many times its size: what the decoder holds beside its pixels, its copy
-/// when it is turned upright, and its reduced copies.
+/// A photograph on its way into memory takes this many times its size: what the decoder holds beside its pixels, its
+/// copy when it is turned upright, and its reduced copies.
 const DECODING: usize = 2;
 
 /// So many photographs are wanted at once at one place: the four at the corners of a grid.

@@ -30,12 +30,14 @@ trueup_core::choice! {
 trueup_core::choice! {
     /// How photographs of very different exposure come together in one picture.
     pub enum Look {
-        /// Differences that a picture can bear are evened out; beyond, sun stays brighter than shade and each near to how it
-        /// was exposed, with a wide and smooth change between them.
+        /// Differences that a picture can bear are evened out; beyond, sun stays brighter than shade and each near to
+        /// how it was exposed, with a wide and smooth change between them.
         Natural = "natural",
-        /// One exposure for the whole panorama: light is in the same proportion everywhere, however dark or bright that is.
+        /// One exposure for the whole panorama: light is in the same proportion everywhere, however dark or bright that
+        /// is.
         Linear = "linear",
-        /// Everything nearly as it was exposed: most detail in sun and in shade, and least of the difference between them.
+        /// Everything nearly as it was exposed: most detail in sun and in shade, and least of the difference between
+        /// them.
         Hdr = "hdr",
     }
 }
@@ -78,16 +80,19 @@ impl Blend {
 trueup_core::options! {
     /// How the photographs become one panorama.
     pub struct RenderOptions("render") {
-        /// How a photograph is read between its samples. Choose `bilinear` if sharp contours show faint lines beside them.
+        /// How a photograph is read between its samples. Choose `bilinear` if sharp contours show faint lines beside
+        /// them.
         interpolation: Interpolation = Interpolation::Bicubic, Allowed::Any, "";
         /// What a pixel shows where photographs overlap. Choose `none` to finish the seams by hand, `feather` for soft
         /// transitions without seams, `average` to see misalignment.
         blend: Blend = Blend::MultiBand, Allowed::Any, "", basic;
-        /// How photographs of very different exposure come together. Choose `linear` to measure light or to finish tones by
-        /// hand, `hdr` for detail in sun and shade alike. Photographs of like exposure look the same with all of them.
+        /// How photographs of very different exposure come together. Choose `linear` to measure light or to finish
+        /// tones by hand, `hdr` for detail in sun and shade alike. Photographs of like exposure look the same with all
+        /// of them.
         look: Look = Look::Natural, Allowed::Any, "", basic;
-        /// Widest transition of multi-band blending, as a share of the photographs' shorter side on the canvas. Raise it if
-        /// brightness or color still change visibly beside a seam, lower it if light spreads from one photograph to another.
+        /// Widest transition of multi-band blending, as a share of the photographs' shorter side on the canvas. Raise
+        /// it if brightness or color still change visibly beside a seam, lower it if light spreads from one photograph
+        /// to another.
         transition: f64 = 0.1, between(0.0, 1.0), "";
     }
 }

@@ -1,5 +1,5 @@
-//! Photographs without the hairlines that some programs leave around them: a white or black row or column of their own at the
-//! border, which would run through the panorama wherever the photograph ends.
+//! Photographs without the hairlines that some programs leave around them: a white or black row or column of their own
+//! at the border, which would run through the panorama wherever the photograph ends.
 
 use trueup_core::Result;
 use trueup_core::color::TransferCurve;
@@ -15,8 +15,8 @@ const WIDEST: f64 = 0.005;
 const FEWEST_ROWS: usize = 3;
 /// Largest distance of a frame's samples from black or white, as a share of white: compression moves them so far.
 const PLAIN: f32 = 0.05;
-/// Least difference of the picture from the frame beside it, as a share of white, at [`MOST_PLACES`] of it: a black sky or a
-/// blown one goes on behind its border.
+/// Least difference of the picture from the frame beside it, as a share of white, at [`MOST_PLACES`] of it: a black sky
+/// or a blown one goes on behind its border.
 const STEP: f32 = 0.1;
 /// Share of a border at which its samples must be a frame's, and the picture beside them must not.
 const MOST_PLACES: f64 = 0.95;
@@ -82,8 +82,8 @@ fn unframed<T: Copy + Default + Into<f32>>(mut raster: Raster<T>, white: f32) ->
     raster
 }
 
-/// Lines at a border that are a frame's, and the one beside them, into which compression and scaling carry it; 0 if there is
-/// no frame.
+/// Lines at a border that are a frame's, and the one beside them, into which compression and scaling carry it; 0 if
+/// there is no frame.
 fn frame_lines<T: Copy + Default + Into<f32>>(raster: &Raster<T>, side: Side, white: f32) -> usize {
     let size = [raster.width(), raster.height()];
     let [along, across] = lengths(side, size);
@@ -111,8 +111,8 @@ fn frame_lines<T: Copy + Default + Into<f32>>(raster: &Raster<T>, side: Side, wh
     }
 }
 
-/// Whether the outermost line is the one beside it under a veil of black or white, as scaling leaves it of a frame that was
-/// less than a pixel wide.
+/// Whether the outermost line is the one beside it under a veil of black or white, as scaling leaves it of a frame that
+/// was less than a pixel wide.
 fn is_veiled<T: Copy + Default + Into<f32>>(
     raster: &Raster<T>,
     side: Side,

@@ -18,13 +18,14 @@ use crate::simd::{Contribution, Development, Positions, accumulate, develop, inv
 use crate::weights::{FEATHER_EXPONENT, Feather, Weighting};
 use crate::window::{Window, common};
 
-/// Photograph pixels per canvas pixel above which a photograph is averaged instead of interpolated. Lower is softer, higher
-/// lets fine patterns shimmer.
+/// Photograph pixels per canvas pixel above which a photograph is averaged instead of interpolated. Lower is softer,
+/// higher lets fine patterns shimmer.
 const MINIFICATION_THRESHOLD: f64 = 1.25;
 
-/// The same of a photograph that was made to fit: the kernel that made it smaller took away most of what would shimmer. What is
-/// as fine as the canvas can show keeps 0.51 (drawn largest) to 0.75 of its contrast by both kernels, 0.72 by averaging; the
-/// finest that is left of the photograph 0.24, where interpolation alone, up to the threshold above, has 0.49.
+/// The same of a photograph that was made to fit: the kernel that made it smaller took away most of what would shimmer.
+/// What is as fine as the canvas can show keeps 0.51 (drawn largest) to 0.75 of its contrast by both kernels, 0.72 by
+/// averaging; the finest that is left of the photograph 0.24, where interpolation alone, up to the threshold above, has
+/// 0.49.
 const FITTED_THRESHOLD: f64 = 1.6;
 
 /// How a photograph is read.
@@ -33,8 +34,8 @@ pub(crate) struct Resampling {
     pub(crate) interpolation: Interpolation,
     /// Photograph pixels per canvas pixel above which the photograph is averaged instead of interpolated.
     pub(crate) minification_threshold: f64,
-    /// Whether a photograph that would be averaged everywhere is made smaller first, once and evenly, until it need not be where
-    /// it is drawn largest: interpolating then takes a fraction of averaging for every canvas pixel.
+    /// Whether a photograph that would be averaged everywhere is made smaller first, once and evenly, until it need not
+    /// be where it is drawn largest: interpolating then takes a fraction of averaging for every canvas pixel.
     pub(crate) fits_photographs: bool,
 }
 
@@ -78,7 +79,8 @@ pub(crate) struct SamplingMemory {
 
 /// Takes a photograph's samples, one row of a window after the other.
 pub(crate) trait RowSink {
-    /// The photograph's own values, 0 to 255, before they are developed, of some pixels of the row that comes next, from its pixel `first` on.
+    /// The photograph's own values, 0 to 255, before they are developed, of some pixels of the row that comes next,
+    /// from its pixel `first` on.
     fn own(&mut self, _first: usize, _samples: &[[f32; 4]]) {}
 
     /// Row `number` of the window, as [`WarpedPhotograph::sample`] has it.
@@ -130,8 +132,8 @@ impl<'a> WarpedPhotograph<'a> {
         Self { ignored, ..self }
     }
 
-    /// The same with highlights spread as by a camera that levels them off all the way: without, bright things turn white together and could not be
-    /// told apart any more.
+    /// The same with highlights spread as by a camera that levels them off all the way: without, bright things turn
+    /// white together and could not be told apart any more.
     pub(crate) fn with_spread_highlights(&self) -> WarpedPhotograph<'_> {
         WarpedPhotograph {
             photograph: Cow::Borrowed(&self.photograph),
@@ -211,8 +213,8 @@ impl<'a> WarpedPhotograph<'a> {
         accumulate(contribution, positions, samples, sums);
     }
 
-    /// Sets in `out`, the pixels of `window` row by row, which are zeros, the square root of corrected linear light and the share
-    /// of the pixel that is covered, where anything is.
+    /// Sets in `out`, the pixels of `window` row by row, which are zeros, the square root of corrected linear light and
+    /// the share of the pixel that is covered, where anything is.
     pub(crate) fn sample(
         &self,
         window: Window<'_>,
@@ -257,8 +259,8 @@ impl<'a> WarpedPhotograph<'a> {
         }
     }
 
-    /// The pixels `columns` of canvas row `y`, of the `row` that begins at column `first`, among the candidates of `scratch`; `look` is
-    /// shown the photograph's own values as [`RowSink::own`] is.
+    /// The pixels `columns` of canvas row `y`, of the `row` that begins at column `first`, among the candidates of
+    /// `scratch`; `look` is shown the photograph's own values as [`RowSink::own`] is.
     #[allow(clippy::too_many_arguments)]
     fn sample_row(
         &self,
@@ -353,8 +355,8 @@ fn reduced(mesh: &GridMesh, factor: f64) -> GridMesh {
 
 /// The fewest photograph pixels per canvas pixel in any cell.
 fn least_footprint(grid: &DeformedGrid) -> f64 {
-    /// A cell that is stretched more unevenly lies at a pole of the projection; it asks for detail along one axis that it
-    /// cannot show along the other.
+    /// A cell that is stretched more unevenly lies at a pole of the projection; it asks for detail along one axis that
+    /// it cannot show along the other.
     const UNEVEN: f64 = 4.0;
     let even =
         |cell: &&Cell| cell.footprint[0].max(cell.footprint[1]) <= UNEVEN * cell.footprint[0].min(cell.footprint[1]);
@@ -369,8 +371,8 @@ fn halvings_before_sampling(grid: &DeformedGrid, minification_threshold: f64) ->
     if wanted >= 2.0 { wanted.log2().floor().min(16.0) as u32 } else { 0 }
 }
 
-/// How many times smaller the photograph is made so that it need not be averaged where it is drawn largest; `None` where that
-/// is not worth a second kernel.
+/// How many times smaller the photograph is made so that it need not be averaged where it is drawn largest; `None`
+/// where that is not worth a second kernel.
 fn fitting_factor(grid: &DeformedGrid, resampling: &Resampling) -> Option<f64> {
     /// Steps of the factor: the same for what is drawn twice on a cylinder, wherever it lies there.
     const STEPS: f64 = 64.0;

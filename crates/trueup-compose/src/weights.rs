@@ -22,8 +22,8 @@ pub(crate) enum Weighting {
     Equal,
 }
 
-/// Power of the feather weight. Higher values let the photograph that lies deepest prevail, which shortens the transition
-/// and with it ghosts; 1 blends over the whole overlap.
+/// Power of the feather weight. Higher values let the photograph that lies deepest prevail, which shortens the
+/// transition and with it ghosts; 1 blends over the whole overlap.
 pub(crate) const FEATHER_EXPONENT: f64 = 3.0;
 
 /// The feather of one photograph: a product of a profile along x and one along y, both 1 at the middle and 0 at the
@@ -32,8 +32,8 @@ pub(crate) const FEATHER_EXPONENT: f64 = 3.0;
 /// The profile is `s(t)^exponent` with `t = 2 min(x, W - x) / W` and the smooth step `s(t) = t^2 (3 - 2 t)`.
 ///
 /// # Departures
-/// The published weight is `min(x + 1, W - x) min(y + 1, H - y)` of whole pixels, whose slope jumps at the middle and at
-/// the border; the smooth step has no such lines to be seen.
+/// The published weight is `min(x + 1, W - x) min(y + 1, H - y)` of whole pixels, whose slope jumps at the middle and
+/// at the border; the smooth step has no such lines to be seen.
 #[derive(Debug, Clone)]
 pub(crate) struct Feather {
     /// Profile at the centers of the columns -1 to W.

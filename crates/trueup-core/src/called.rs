@@ -14,8 +14,9 @@ pub enum Called {
 }
 
 impl Called {
-    /// Which of the photographs people call `name`, of the files `files`, each with the index of its photograph, which may have several: the
-    /// first whose file is called just that, or else the one whose file's path ends with it, by whole folders.
+    /// Which of the photographs people call `name`, of the files `files`, each with the index of its photograph, which
+    /// may have several: the first whose file is called just that, or else the one whose file's path ends with it, by
+    /// whole folders.
     pub fn by<'a>(name: &Path, files: impl Iterator<Item = (usize, &'a Path)>) -> Self {
         let mut meant = Vec::new();
         for (photograph, file) in files {

@@ -93,8 +93,8 @@ impl Camera {
         if self.lens.is_pinhole() { bearing } else { self.lens.ray(bearing.xy()) }
     }
 
-    /// The pixel of a bearing in the camera frame; `None` behind the camera or within 1e-6 of its plane, and for a fisheye
-    /// within 1e-6 of straight behind.
+    /// The pixel of a bearing in the camera frame; `None` behind the camera or within 1e-6 of its plane, and for a
+    /// fisheye within 1e-6 of straight behind.
     pub fn project(&self, bearing: Vector3<f64>) -> Option<Vector2<f64>> {
         const MIN_DEPTH: f64 = 1e-6;
         if !self.lens.is_pinhole() {
@@ -121,7 +121,8 @@ impl Camera {
         Some(ProjectionDerivatives { pixel, by_bearing: by_ray * self.focal_px, by_intrinsics })
     }
 
-    /// How the pixel of a bearing moves with the bearing's three entries: [`Self::projection_derivatives`] without the intrinsics.
+    /// How the pixel of a bearing moves with the bearing's three entries: [`Self::projection_derivatives`] without the
+    /// intrinsics.
     pub fn projection_by_bearing(&self, bearing: Vector3<f64>) -> Option<Matrix2x3<f64>> {
         Some(self.lens.by_ray(bearing)? * self.focal_px)
     }
@@ -214,8 +215,8 @@ mod tests {
         assert!(camera.project(Vector3::new(1.0, 0.0, 0.0)).is_none());
     }
 
-    /// A decentered lens, as one was found for a phone, folds directions nearly at right angles to its axis back into the
-    /// picture.
+    /// A decentered lens, as one was found for a phone, folds directions nearly at right angles to its axis back into
+    /// the picture.
     #[test]
     fn what_a_lens_folds_back_is_not_shown() {
         let terms = LensTerms {

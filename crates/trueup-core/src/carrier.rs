@@ -9,7 +9,8 @@ use crate::mask::Mask;
 /// A rectangle of a picture as it is shown: left, top, right and bottom, in its pixels.
 pub type Rectangle = [f64; 4];
 
-/// Where a photograph shows what the camera is fixed to, and not the scene: rectangles side by side, in pixels of the photograph.
+/// Where a photograph shows what the camera is fixed to, and not the scene: rectangles side by side, in pixels of the
+/// photograph.
 ///
 /// Nothing there is looked at, and it is not shown where another photograph can be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,4 +1,5 @@
-//! What every stage receives beside its input and options: progress, cancellation, seed and a sink for findings and times.
+//! What every stage receives beside its input and options: progress, cancellation, seed and a sink for findings and
+//! times.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -86,7 +87,8 @@ impl<'a> StageContext<'a> {
         Self { progress, cancel, seed: 0, sink: Mutex::default() }
     }
 
-    /// The same cancellation and seed, for a part of the work whose progress is told by the whole. Findings are its own.
+    /// The same cancellation and seed, for a part of the work whose progress is told by the whole. Findings are its
+    /// own.
     pub fn without_progress(&self) -> StageContext<'a> {
         Self::new(&SILENT, self.cancel).seeded(self.seed)
     }

@@ -64,8 +64,8 @@ pub enum Error {
         /// The method, as in the options, or an option as it is set, `table.option = value`. Messages name it by
         /// [`Error::named_choice`].
         method: String,
-        /// Which photograph it cannot place and why, with the angle where the field of view is at fault, without a closing
-        /// full stop.
+        /// Which photograph it cannot place and why, with the angle where the field of view is at fault, without a
+        /// closing full stop.
         reason: String,
         /// What the user can do about it, a whole sentence.
         hint: String,
@@ -101,8 +101,8 @@ impl Error {
         Self::NotApplicable { method: method.to_string(), reason: reason.to_string(), hint: hint.to_string() }
     }
 
-    /// What an [`Error::NotApplicable`] says of its `method` in a sentence: an option as it is set says by itself what it is, a method's
-    /// name alone does not.
+    /// What an [`Error::NotApplicable`] says of its `method` in a sentence: an option as it is set says by itself what
+    /// it is, a method's name alone does not.
     pub fn named_choice(method: &str) -> String {
         if method.contains('=') { method.to_owned() } else { format!("the method {method}") }
     }

@@ -1,7 +1,7 @@
 //! Interpolation between samples.
 
-/// Weights of four neighboring samples for a position `fraction` (in [0, 1]) beyond the second of them: cubic convolution
-/// with a = -1/2 (the Catmull-Rom spline), exact for parabolas. They add up to 1.
+/// Weights of four neighboring samples for a position `fraction` (in [0, 1]) beyond the second of them: cubic
+/// convolution with a = -1/2 (the Catmull-Rom spline), exact for parabolas. They add up to 1.
 ///
 /// # Source
 /// Keys, "Cubic convolution interpolation for digital image processing", IEEE TASSP 29(6), 1981, equation 15.

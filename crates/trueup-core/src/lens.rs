@@ -1,14 +1,14 @@
 //! The lens: how rays before a camera become places on its picture, before focal length and principal point.
 //!
 //! # Source
-//! The rectilinear projection with D. C. Brown's radial and tangential terms ("Decentering distortion of lenses", 1966);
-//! the equidistant projection with a polynomial of the angle for fisheyes (J. Kannala and S. S. Brandt, "A generic camera
-//! model and calibration method for conventional, wide-angle, and fish-eye lenses", 2006).
+//! The rectilinear projection with D. C. Brown's radial and tangential terms ("Decentering distortion of lenses",
+//! 1966); the equidistant projection with a polynomial of the angle for fisheyes (J. Kannala and S. S. Brandt, "A
+//! generic camera model and calibration method for conventional, wide-angle, and fish-eye lenses", 2006).
 //!
 //! # Departures
 //! A polynomial that bends light back towards the middle is not followed there: from where its slope has fallen to
-//! `LEAST_SLOPE`, or at the farthest angle for which the polynomial is taken seriously, the radius grows straight on. So
-//! every lens maps rays and places one to one, whatever an estimate of its terms may be on the way.
+//! `LEAST_SLOPE`, or at the farthest angle for which the polynomial is taken seriously, the radius grows straight on.
+//! So every lens maps rays and places one to one, whatever an estimate of its terms may be on the way.
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix2x4, SMatrix, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -36,7 +36,8 @@ pub enum LensProjection {
 /// A lens, in units of the focal length.
 ///
 /// With u the place of a ray by the projection alone and r = |u|, light falls at
-/// `u (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (2 p1 x y + p2 (r^2 + 2 x^2), p1 (r^2 + 2 y^2) + 2 p2 x y)`, u = (x, y).
+/// `u (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (2 p1 x y + p2 (r^2 + 2 x^2), p1 (r^2 + 2 y^2) + 2 p2 x y)`, u = (x,
+/// y).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(from = "LensTerms", into = "LensTerms")]
 pub struct Lens {
@@ -75,8 +76,8 @@ impl PlacedLens {
         Self { center_px: self.center_px.map(|part| part * factor), ..*self }
     }
 
-    /// The same lens before the photograph turned clockwise by `quarters` of a turn. What a lens does aside turns with the
-    /// picture: its center, and (p2, p1), which is a direction.
+    /// The same lens before the photograph turned clockwise by `quarters` of a turn. What a lens does aside turns with
+    /// the picture: its center, and (p2, p1), which is a direction.
     #[must_use]
     pub fn turned(&self, quarters: u8) -> Self {
         let turn = |[x, y]: [f64; 2]| [-y, x];
@@ -115,8 +116,8 @@ pub struct TriedLens {
     pub relative_focal: f64,
 }
 
-/// The lenses worth trying where nothing is known: pinholes and barrels of 37 to 103 degrees across, and fisheyes of 72 to
-/// 220 degrees, each neighbor a few pixels from the next.
+/// The lenses worth trying where nothing is known: pinholes and barrels of 37 to 103 degrees across, and fisheyes of 72
+/// to 220 degrees, each neighbor a few pixels from the next.
 pub fn tried_lenses() -> Vec<TriedLens> {
     /// k1 of the rectilinear ones: none, that of a wide lens, that of an action camera.
     const RECTILINEAR_K1: [f64; 3] = [0.0, -0.12, -0.25];
@@ -246,8 +247,8 @@ impl Lens {
         (undistorted * factor + self.aside(undistorted), radial + aside)
     }
 
-    /// A radius near the one that is distorted to `wanted`: the first terms of the inverse's series, where they change it by
-    /// little.
+    /// A radius near the one that is distorted to `wanted`: the first terms of the inverse's series, where they change
+    /// it by little.
     fn roughly_undistorted(&self, wanted: f64) -> f64 {
         /// Share of the radius.
         const LITTLE: f64 = 0.3;

@@ -12,8 +12,9 @@ fn fisheye(radial: [f64; 4]) -> Lens {
     Lens::new(LensTerms { projection: LensProjection::Equidistant, radial, tangential: [0.0; 2] })
 }
 
-/// x = 1/2, y = 1/4: r^2 = 5/16; with k1 = -1/10 and k2 = 1/100 the factor is 1 - 1/32 + 1/1024 = 993/1024. The tangential
-/// terms p1 = 1/100 and p2 = -1/50 add 2/800 - (5/16 + 1/2)/50 = -11/800 and (5/16 + 1/8)/100 - 4/800 = -1/1600.
+/// x = 1/2, y = 1/4: r^2 = 5/16; with k1 = -1/10 and k2 = 1/100 the factor is 1 - 1/32 + 1/1024 = 993/1024. The
+/// tangential terms p1 = 1/100 and p2 = -1/50 add 2/800 - (5/16 + 1/2)/50 = -11/800 and (5/16 + 1/8)/100 - 4/800 =
+/// -1/1600.
 #[test]
 fn brown_bends_as_computed_by_hand() {
     let lens = brown([-0.1, 0.01, 0.0, 0.0], [0.01, -0.02]);

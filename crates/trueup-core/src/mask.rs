@@ -29,8 +29,8 @@ impl Mask {
         Self { width, height, words }
     }
 
-    /// A mask of `width` x `height` pixels, of whose row y those of the columns are marked that `marked` hands out for it; columns beyond the
-    /// width are passed over. Large parts are marked by the word.
+    /// A mask of `width` x `height` pixels, of whose row y those of the columns are marked that `marked` hands out for
+    /// it; columns beyond the width are passed over. Large parts are marked by the word.
     pub fn from_rows<Columns: IntoIterator<Item = Range<usize>>>(
         width: usize,
         height: usize,

@@ -14,8 +14,8 @@ pub struct PointMatch {
     pub in_b: [f64; 2],
 }
 
-/// Matches that copies share: pairs are handed from stage to stage, renumbered and chosen among, and their matches stay what they are.
-/// Whoever changes a copy has it to itself from then on.
+/// Matches that copies share: pairs are handed from stage to stage, renumbered and chosen among, and their matches stay
+/// what they are. Whoever changes a copy has it to itself from then on.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PointMatches(Arc<Vec<PointMatch>>);
 
@@ -81,7 +81,8 @@ pub enum PairVerdict {
     ImplausibleHomography,
     /// Too few of the matches in the predicted overlap agree.
     TooFewInliers,
-    /// Enough matches agree, but little else in the overlap that they predict looks alike: equal things in different places.
+    /// Enough matches agree, but little else in the overlap that they predict looks alike: equal things in different
+    /// places.
     LooksDifferent,
 }
 
@@ -103,8 +104,8 @@ pub struct PairMatches {
     pub putative: usize,
     /// Putative matches that lie inside the overlap that the homography or the turned lens predicts; 0 without either.
     pub in_overlap: usize,
-    /// Those of them that agree with the global homography or the turned lens (n_i of the Brown-Lowe test); where these alone are too
-    /// few to join the pair, also those on further planes and elsewhere in depth.
+    /// Those of them that agree with the global homography or the turned lens (n_i of the Brown-Lowe test); where these
+    /// alone are too few to join the pair, also those on further planes and elsewhere in depth.
     pub agreeing: usize,
     /// How many had to agree for the pair to be joined.
     pub needed: usize,
@@ -114,13 +115,14 @@ pub struct PairMatches {
     pub b_from_a: Option<[[f64; 3]; 3]>,
     /// The matches kept (P_ij): global inliers first, then those of further planes. Empty unless joined.
     pub inliers: PointMatches,
-    /// Further matches of which neighbors moved alike and that, with the others, one epipolar geometry explains: the same things, elsewhere in
-    /// depth than the planes that `inliers` lie on. Empty unless joined.
+    /// Further matches of which neighbors moved alike and that, with the others, one epipolar geometry explains: the
+    /// same things, elsewhere in depth than the planes that `inliers` lie on. Empty unless joined.
     pub elsewhere: PointMatches,
 }
 
 impl PairMatches {
-    /// How many matches agree for each that had to, of which Brown and Lowe want 8 + 0.3 n_f: from 1 on the pair is joined.
+    /// How many matches agree for each that had to, of which Brown and Lowe want 8 + 0.3 n_f: from 1 on the pair is
+    /// joined.
     pub fn confidence(&self) -> f64 {
         if self.needed == 0 { 0.0 } else { self.agreeing as f64 / self.needed as f64 }
     }

@@ -40,7 +40,8 @@ pub fn needed_in_words(bytes: u64) -> String {
     bytes_in_words(bytes.checked_next_multiple_of(digit_bytes(bytes)).unwrap_or(bytes))
 }
 
-/// A number of bytes that there are, for people: rounded down, so that no more are named, and fewer than [`needed_in_words`] of more.
+/// A number of bytes that there are, for people: rounded down, so that no more are named, and fewer than
+/// [`needed_in_words`] of more.
 pub fn room_in_words(bytes: u64) -> String {
     bytes_in_words(bytes - bytes % digit_bytes(bytes))
 }
@@ -54,8 +55,8 @@ fn digit_bytes(bytes: u64) -> u64 {
     }
 }
 
-/// Asks for `bytes` of memory in one piece and gives them back, so that a large allocation which the system would refuse is an
-/// error and not the program's end. `subject` is what they are for.
+/// Asks for `bytes` of memory in one piece and gives them back, so that a large allocation which the system would
+/// refuse is an error and not the program's end. `subject` is what they are for.
 ///
 /// # Errors
 /// [`Error::Limits`] if they are not to be had.

@@ -26,8 +26,8 @@ pub struct GridMesh {
     pub lines: Option<GridLines>,
 }
 
-/// Where the columns and rows of a grid's vertices lie in the photograph, as shares of its width and height: each ascending
-/// from 0 to 1.
+/// Where the columns and rows of a grid's vertices lie in the photograph, as shares of its width and height: each
+/// ascending from 0 to 1.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GridLines {
     /// A share of the width for every column of vertices.
@@ -97,7 +97,8 @@ impl GridMesh {
         self.target[vertex].iter().all(|coordinate| coordinate.is_finite())
     }
 
-    /// The corners (top left, top right, bottom right, bottom left) of every cell whose corners are all defined, row-major.
+    /// The corners (top left, top right, bottom right, bottom left) of every cell whose corners are all defined,
+    /// row-major.
     pub fn whole_cells(&self) -> impl Iterator<Item = [usize; 4]> + '_ {
         let cells = (self.rows.max(1) - 1) * (self.columns.max(1) - 1);
         (0..cells)
@@ -108,7 +109,8 @@ impl GridMesh {
             .filter(|corners| corners.iter().all(|&corner| self.is_defined(corner)))
     }
 
-    /// The cell along one axis that holds the share `at` of the photograph, and the share of the cell that lies before it.
+    /// The cell along one axis that holds the share `at` of the photograph, and the share of the cell that lies before
+    /// it.
     fn within(lines: &[f64], at: f64) -> (usize, f64) {
         let cell = lines.partition_point(|&line| line <= at).clamp(1, lines.len() - 1) - 1;
         (cell, (at - lines[cell]) / (lines[cell + 1] - lines[cell]))
@@ -145,8 +147,8 @@ impl GridMesh {
             .fold(Vector2::zeros(), |sum, (&corner, weight)| sum + Vector2::from(self.target[corner]) * weight)
     }
 
-    /// How the place in the panorama changes with the pixel: the columns are its derivatives by x and y, those of the cell
-    /// that [`Self::bilinear`] uses.
+    /// How the place in the panorama changes with the pixel: the columns are its derivatives by x and y, those of the
+    /// cell that [`Self::bilinear`] uses.
     pub fn derivative(&self, point: Vector2<f64>) -> Matrix2<f64> {
         let ([a, b, c, d], _) = self.bilinear(point);
         let origin = self.source(a);
@@ -158,11 +160,12 @@ impl GridMesh {
         Matrix2::from_columns(&[along_x, along_y])
     }
 
-    /// Clockwise angle from down to where the direction that the clockwise turn `gamma` stands upright points, in the middle of
-    /// the photograph as it lies in the panorama; radians, in [-pi, pi). NaN where the middle has no place.
+    /// Clockwise angle from down to where the direction that the clockwise turn `gamma` stands upright points, in the
+    /// middle of the photograph as it lies in the panorama; radians, in [-pi, pi). NaN where the middle has no place.
     ///
-    /// By central differences over the cells around the middle vertex, or across the middle cell where there is none, in both
-    /// directions: a panorama may stretch the two differently, and then the direction of the columns says nothing of another one.
+    /// By central differences over the cells around the middle vertex, or across the middle cell where there is none,
+    /// in both directions: a panorama may stretch the two differently, and then the direction of the columns says
+    /// nothing of another one.
     pub fn lean_in_the_middle(&self, gamma: f64) -> f64 {
         // The vertices nearest to the middle, before and behind it, and those that differences are taken between.
         let nearest = |count: usize| [(count.saturating_sub(1)) / 2, count / 2];
@@ -248,7 +251,8 @@ mod tests {
         }
     }
 
-    /// Of 400 x 300 px in cells of about 40, with an even and an odd number of them: turned more and more to the right, by nothing in the middle.
+    /// Of 400 x 300 px in cells of about 40, with an even and an odd number of them: turned more and more to the right,
+    /// by nothing in the middle.
     #[test]
     fn the_middle_is_in_the_middle_however_many_cells_there_are() {
         for cells in [(10, 7), (9, 8), (9, 7), (10, 8)] {
@@ -263,8 +267,8 @@ mod tests {
         }
     }
 
-    /// Near a pole of an equirectangular panorama, rows are drawn longer than columns: a rolled photograph whose verticals stand
-    /// upright there has columns that lean by more than its roll.
+    /// Near a pole of an equirectangular panorama, rows are drawn longer than columns: a rolled photograph whose
+    /// verticals stand upright there has columns that lean by more than its roll.
     #[test]
     fn verticals_stand_upright_however_much_rows_are_stretched() {
         let gamma = 0.2_f64;
@@ -298,8 +302,8 @@ mod tests {
         assert_eq!(mesh.source_of(Vector2::repeat(f64::NAN), Vector2::zeros()), None);
     }
 
-    /// Lines at thirds of the unit square over 30 x 12 pixels: (14, 3) lies two tenths into the middle column, and 3 of 4
-    /// rows' pixels into the first row. A vertex that is not defined takes its four cells away.
+    /// Lines at thirds of the unit square over 30 x 12 pixels: (14, 3) lies two tenths into the middle column, and 3 of
+    /// 4 rows' pixels into the first row. A vertex that is not defined takes its four cells away.
     #[test]
     fn uneven_lines_and_undefined_vertices() {
         let lines = GridLines { columns: vec![0.0, 0.4, 0.9, 1.0], rows: vec![0.0, 1.0 / 3.0, 1.0] };

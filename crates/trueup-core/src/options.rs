@@ -113,7 +113,8 @@ pub enum Tier {
     Expert,
 }
 
-/// The tier of an option: basic where its declaration says so. Used by the code that [`options!`](crate::options!) generates.
+/// The tier of an option: basic where its declaration says so. Used by the code that [`options!`](crate::options!)
+/// generates.
 pub const fn tier_of(basic: &[&str]) -> Tier {
     if basic.is_empty() { Tier::Expert } else { Tier::Basic }
 }
@@ -178,8 +179,8 @@ pub fn check_option<T: OptionValue>(stage: &str, name: &str, value: &T, allowed:
     })
 }
 
-/// Declares a stage's options: struct, defaults, ranges, units, reference. An option that everyone has a reason to change
-/// is marked `basic` after its unit; the others are for experts.
+/// Declares a stage's options: struct, defaults, ranges, units, reference. An option that everyone has a reason to
+/// change is marked `basic` after its unit; the others are for experts.
 ///
 /// ```
 /// trueup_core::options! {

@@ -8,7 +8,8 @@ use crate::mask::Mask;
 use crate::raster::{Photograph, Raster};
 use crate::stretches::complement;
 
-/// A polygon, in pixels of a picture as it is shown, inside of which the photograph lies. What is beside it is no part of the photograph.
+/// A polygon, in pixels of a picture as it is shown, inside of which the photograph lies. What is beside it is no part
+/// of the photograph.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<[f64; 2]>", into = "Vec<[f64; 2]>")]
 pub struct Outline {
@@ -113,7 +114,8 @@ mod tests {
         Outline::new(vec![[4.0, 1.0], [7.0, 4.0], [4.0, 7.0], [1.0, 4.0]]).expect("four corners")
     }
 
-    /// A pixel is inside whose center is; of two centers on the outline of a row the left one is. By hand: 1, 3, 5, 5, 3 and 1 of rows 1 to 6.
+    /// A pixel is inside whose center is; of two centers on the outline of a row the left one is. By hand: 1, 3, 5, 5,
+    /// 3 and 1 of rows 1 to 6.
     #[test]
     fn what_is_beside_a_diamond() {
         let rows: Vec<_> = (0..8).map(|y| diamond().stretches(y, 8)).collect();

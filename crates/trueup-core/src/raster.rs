@@ -202,7 +202,8 @@ pub trait RowSource: Sync {
     /// # Errors
     /// If the pixels cannot be had, e.g. from a file that holds them.
     fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()>;
-    /// Writes row `y` as 16-bit RGBA, encoded by the same curve, with straight alpha: `4 * width` samples, 65535 is full.
+    /// Writes row `y` as 16-bit RGBA, encoded by the same curve, with straight alpha: `4 * width` samples, 65535 is
+    /// full.
     ///
     /// # Errors
     /// Those of [`Self::rgba8_row`].

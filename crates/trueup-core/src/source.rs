@@ -60,8 +60,8 @@ pub struct RecordedGravity {
 /// What a camera recorded of how a photograph was exposed.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RecordedExposure {
-    /// How much light the same scene came to, in stops: the logarithm to base 2 of exposure time in seconds times sensitivity (ISO) over the square of
-    /// the f-number. `None` if one of them is missing or impossible.
+    /// How much light the same scene came to, in stops: the logarithm to base 2 of exposure time in seconds times
+    /// sensitivity (ISO) over the square of the f-number. `None` if one of them is missing or impossible.
     pub stops: Option<f64>,
     /// When it was taken, to the fraction of a second that is stated: text that differs between two moments.
     pub taken: Option<String>,
@@ -81,11 +81,12 @@ pub struct SourceImage {
     /// What of the picture in the file lies beside the photograph, after orientation: it is cut off on decoding.
     #[serde(default)]
     pub inset: Inset,
-    /// Inside of what the photograph lies, in pixels of width and height, where these hold more than it: what is beside it becomes
-    /// transparent on decoding.
+    /// Inside of what the photograph lies, in pixels of width and height, where these hold more than it: what is beside
+    /// it becomes transparent on decoding.
     #[serde(default)]
     pub outline: Option<Outline>,
-    /// Where it shows what carries the camera, in pixels of width and height: not looked at, and not shown where another photograph can be.
+    /// Where it shows what carries the camera, in pixels of width and height: not looked at, and not shown where
+    /// another photograph can be.
     #[serde(default)]
     pub carrier: Option<CarrierParts>,
     /// EXIF orientation (1 to 8) that is applied on decoding: 1 where the tag is absent or stale.
@@ -109,12 +110,12 @@ pub struct SourceImage {
     /// Whether its samples are floating point numbers: linear light.
     #[serde(default)]
     pub is_float: bool,
-    /// The light that it is handed out in, where its samples are floating point numbers and what is brighter than white is kept; `None`
-    /// where 1 is white.
+    /// The light that it is handed out in, where its samples are floating point numbers and what is brighter than white
+    /// is kept; `None` where 1 is white.
     #[serde(default)]
     pub light: Option<LightRange>,
-    /// The other exposures of the stack whose reference this is: its pixels are those of all, fused or merged. Empty for a photograph of one
-    /// file.
+    /// The other exposures of the stack whose reference this is: its pixels are those of all, fused or merged. Empty
+    /// for a photograph of one file.
     #[serde(default)]
     pub stack: Vec<StackMember>,
 }
@@ -149,10 +150,11 @@ impl SourceImage {
         self.inset.outer([self.width, self.height])
     }
 
-    /// The photograph that lies in this picture inside `inset`, with what is known of its lens; `None` if nothing is left of it.
+    /// The photograph that lies in this picture inside `inset`, with what is known of its lens; `None` if nothing is
+    /// left of it.
     ///
-    /// Its outline and the carrier's parts are not known then. A stated focal length in terms of 35 mm film is taken to be that of the photograph, which was smaller on the film then; any other
-    /// one has to do with pixels.
+    /// Its outline and the carrier's parts are not known then. A stated focal length in terms of 35 mm film is taken to
+    /// be that of the photograph, which was smaller on the film then; any other one has to do with pixels.
     pub fn inside(self, inset: Inset) -> Option<Self> {
         let [old_width, old_height] = [self.width, self.height];
         let [width, height] = inset.inner([old_width, old_height])?;
@@ -204,8 +206,8 @@ pub trait StackFusion: std::fmt::Debug + Send + Sync {
     /// [`Error::Input`](crate::Error::Input) if a member has another size or a homography that is none.
     fn fuse(&self, reference: &Photograph, others: &[AlignedPhotograph]) -> Result<Photograph>;
 
-    /// The light of all exposures, in the frame and channels of the reference, as 16-bit samples of `light`; `samples` is the curve of the
-    /// exposures' own. Light is in the unit in which the reference's samples tell it.
+    /// The light of all exposures, in the frame and channels of the reference, as 16-bit samples of `light`; `samples`
+    /// is the curve of the exposures' own. Light is in the unit in which the reference's samples tell it.
     ///
     /// # Errors
     /// Those of [`Self::fuse`].
@@ -272,8 +274,8 @@ pub trait PhotographSource: Sync {
         None
     }
 
-    /// How the samples of all photographs stand for light; sRGB's curve unless told otherwise. What wraps another source
-    /// hands its curve on.
+    /// How the samples of all photographs stand for light; sRGB's curve unless told otherwise. What wraps another
+    /// source hands its curve on.
     fn transfer_curve(&self) -> TransferCurve {
         TransferCurve::SRGB
     }

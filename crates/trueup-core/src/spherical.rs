@@ -14,9 +14,9 @@ pub enum SphericalProjection {
 
 /// Where a panorama lies on the whole sphere of its projection: the whole picture's size, and the part that is there.
 ///
-/// The whole turn is `full_width` pixels wide. An equirectangular sphere is half as high, from the zenith (row 0) to the
-/// nadir. A cylinder has no end: `full_height` is then any height that holds the part and has the horizon in its middle.
-/// Column `full_width / 2` looks to [`Self::middle_yaw`].
+/// The whole turn is `full_width` pixels wide. An equirectangular sphere is half as high, from the zenith (row 0) to
+/// the nadir. A cylinder has no end: `full_height` is then any height that holds the part and has the horizon in its
+/// middle. Column `full_width / 2` looks to [`Self::middle_yaw`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SphericalFrame {
     /// How directions become pixels.

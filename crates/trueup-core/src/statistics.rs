@@ -28,7 +28,8 @@ impl TotalOrder for f64 {
     }
 }
 
-/// The middle value, of an even number the upper one of the two; `None` without any. Puts the values in another order, in linear time.
+/// The middle value, of an even number the upper one of the two; `None` without any. Puts the values in another order,
+/// in linear time.
 pub fn median<T: TotalOrder>(values: &mut [T]) -> Option<T> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, T::total_cmp).1)
@@ -39,7 +40,8 @@ pub fn median_of<T: TotalOrder>(values: impl IntoIterator<Item = T>) -> Option<T
     median(&mut values.into_iter().collect::<Vec<T>>())
 }
 
-/// Standard deviation about the axis of which an information matrix (the inverse of a covariance) tells least; infinite where it tells nothing of it.
+/// Standard deviation about the axis of which an information matrix (the inverse of a covariance) tells least; infinite
+/// where it tells nothing of it.
 pub fn greatest_deviation(information: &Matrix2<f64>) -> f64 {
     information.symmetric_eigenvalues().min().max(0.0).sqrt().recip()
 }
@@ -56,7 +58,8 @@ mod tests {
         assert_eq!(median(&mut [4.0_f32, -1.0, 2.0, 1.0]), Some(2.0));
     }
 
-    /// Three quarters of a normal distribution lie below 0.67449 standard deviations, so that half of its magnitudes do.
+    /// Three quarters of a normal distribution lie below 0.67449 standard deviations, so that half of its magnitudes
+    /// do.
     #[test]
     fn the_deviation_of_a_normal_distribution_comes_of_its_upper_quartile() {
         assert!((SD_PER_MEDIAN_MAGNITUDE * 0.674_489_75 - 1.0).abs() < 1e-5);

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-/// What of the columns `of` lies outside of `stretches` of them, which ascend and do not overlap: ascending stretches, one more than these; some
-/// may be empty.
+/// What of the columns `of` lies outside of `stretches` of them, which ascend and do not overlap: ascending stretches,
+/// one more than these; some may be empty.
 pub fn complement(
     of: Range<usize>,
     stretches: impl Iterator<Item = Range<usize>> + Clone,

@@ -7,12 +7,12 @@ use crate::camera::Camera;
 use crate::lens::{LensProjection, PlacedLens, TriedLens, tried_lenses};
 use crate::source::WorkingFrame;
 
-/// Standard deviation of a focal length that the user told, relative: what is engraved on a lens is rounded, and focusing on near things
-/// changes it.
+/// Standard deviation of a focal length that the user told, relative: what is engraved on a lens is rounded, and
+/// focusing on near things changes it.
 pub const TOLD_FOCAL_SD: f64 = 0.02;
 
-/// What the user told of the lens of a photograph; nothing by default. Metadata tell nothing here: what they say of focal lengths is off by up to
-/// a tenth.
+/// What the user told of the lens of a photograph; nothing by default. Metadata tell nothing here: what they say of
+/// focal lengths is off by up to a tenth.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ToldLens {
     /// All that the lens does, in working pixels.
@@ -34,7 +34,8 @@ impl ToldLens {
         self.lens.is_some_and(|lens| lens == PlacedLens::default())
     }
 
-    /// The unturned camera of a photograph that is told so, and `tried` for what is not told; `None` where that contradicts what is told.
+    /// The unturned camera of a photograph that is told so, and `tried` for what is not told; `None` where that
+    /// contradicts what is told.
     pub fn camera(&self, tried: &TriedLens, frame: &WorkingFrame) -> Option<Camera> {
         let focal_px = self.focal_px.unwrap_or(tried.relative_focal * frame.width.max(frame.height));
         let pinhole = Camera::new(focal_px, frame.width, frame.height, &Matrix3::identity());
@@ -46,8 +47,8 @@ impl ToldLens {
     }
 }
 
-/// The cameras worth trying on two photographs, unturned: what is told of them, and all [`tried_lenses`] for what is not, the same
-/// through both as far as it is not told.
+/// The cameras worth trying on two photographs, unturned: what is told of them, and all [`tried_lenses`] for what is
+/// not, the same through both as far as it is not told.
 pub fn tried_cameras(told: [&ToldLens; 2], frames: [&WorkingFrame; 2]) -> Vec<[Camera; 2]> {
     let mut cameras: Vec<[Camera; 2]> = Vec::new();
     for tried in tried_lenses() {

@@ -226,8 +226,8 @@ mod tests {
         assert_eq!(complaint(vec![photograph("a.jpg"), photograph("b.jpg")]), "");
     }
 
-    /// By hand, f = 400: 45 degrees to the right the barrel has 400 (1 - 0.2 + 0.05) = 340 px from its center, 6 px right and 4 px above the middle;
-    /// the fisheye 400 (pi/4) (1 - 0.015 (pi/4)^2) px = 311.2524 from the middle.
+    /// By hand, f = 400: 45 degrees to the right the barrel has 400 (1 - 0.2 + 0.05) = 340 px from its center, 6 px
+    /// right and 4 px above the middle; the fisheye 400 (pi/4) (1 - 0.015 (pi/4)^2) px = 311.2524 from the middle.
     #[test]
     fn a_camera_sees_through_its_lens() {
         let seen = |lens: &str| {

@@ -13,13 +13,13 @@ use crate::formats;
 #[derive(Debug)]
 pub struct Developer {
     program: &'static str,
-    /// What makes it write, to standard output, a TIFF of 16 bits in sRGB, upright, with gray as the camera took it to be, and as bright as the
-    /// numbers say: photographs of one exposure stay alike.
+    /// What makes it write, to standard output, a TIFF of 16 bits in sRGB, upright, with gray as the camera took it to
+    /// be, and as bright as the numbers say: photographs of one exposure stay alike.
     arguments: &'static [&'static str],
 }
 
-/// The programs, the one that knows newer cameras first. Both take what they are told in the same words: white balance of the camera, no
-/// brightening of their own, 16 bits, TIFF, and the power and slope of sRGB's curve.
+/// The programs, the one that knows newer cameras first. Both take what they are told in the same words: white balance
+/// of the camera, no brightening of their own, 16 bits, TIFF, and the power and slope of sRGB's curve.
 ///
 /// # Source
 /// The usage that they print: LibRaw's sample 0.20 (`-Z -` is standard output), dcraw 9.28 (`-c` is).
@@ -47,7 +47,8 @@ impl Developer {
     /// Develops the camera raw `raw` into a new file `developed`, a TIFF.
     ///
     /// # Errors
-    /// [`Error::Input`] with the program's words if it cannot; [`Error::Io`] if there can be no such file; [`Error::Cancelled`].
+    /// [`Error::Input`] with the program's words if it cannot; [`Error::Io`] if there can be no such file;
+    /// [`Error::Cancelled`].
     pub fn develop(&self, raw: &Path, developed: &Path, context: &StageContext) -> Result<()> {
         let io = |error| Error::io("writing", developed, error);
         // A path from the root on is no option.

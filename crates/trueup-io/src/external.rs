@@ -1,4 +1,5 @@
-//! Programs that are started to read what trueup does not: with nothing but the file, and ended when the work is cancelled.
+//! Programs that are started to read what trueup does not: with nothing but the file, and ended when the work is
+//! cancelled.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -34,8 +34,8 @@ pub(crate) struct Format {
 /// A file that is read, from its first byte on.
 pub(crate) type Input = BufReader<File>;
 
-/// How a format is read. Nothing but `pixels` reads pixels. What is read goes through the methods of the same names, which contain
-/// panics of decoders.
+/// How a format is read. Nothing but `pixels` reads pixels. What is read goes through the methods of the same names,
+/// which contain panics of decoders.
 pub(crate) struct Reading {
     /// Which photographs are read, for docs/formats.md.
     #[cfg_attr(not(test), expect(dead_code, reason = "for the page of formats, which a test compares"))]
@@ -50,23 +50,23 @@ pub(crate) struct Reading {
     pub(crate) exif: fn(&mut Input) -> Option<ExifFields>,
     /// The fields of these tags, whole. Damaged ones count as absent.
     pub(crate) whole_fields: fn(&mut Input, &[Tag]) -> Option<Vec<Field>>,
-    /// The pixels as they are stored, before orientation. Refuses what is damaged, incomplete, or no longer of the size that
-    /// was found when the photograph was examined.
+    /// The pixels as they are stored, before orientation. Refuses what is damaged, incomplete, or no longer of the size
+    /// that was found when the photograph was examined.
     pub(crate) pixels: fn(&SourceImage, Input) -> Result<Photograph>,
-    /// The pixels as they are stored, made smaller by the decoder itself, for people to look at; `None` if decoders of this format
-    /// cannot do that.
+    /// The pixels as they are stored, made smaller by the decoder itself, for people to look at; `None` if decoders of
+    /// this format cannot do that.
     pub(crate) reduced: Option<ReducedPixels>,
-    /// Bytes of a pixel on its way into memory: in the decoder, and in the photograph beside it. Of a file whose header cannot be read it
-    /// does not matter.
+    /// Bytes of a pixel on its way into memory: in the decoder, and in the photograph beside it. Of a file whose header
+    /// cannot be read it does not matter.
     pub(crate) pixel_bytes: fn(&mut Input) -> usize,
 }
 
-/// Decodes a photograph as it is stored, with both sides divided by the same 1, 2, 4 or 8 and rounded up, of at least the given columns
-/// and rows.
+/// Decodes a photograph as it is stored, with both sides divided by the same 1, 2, 4 or 8 and rounded up, of at least
+/// the given columns and rows.
 pub(crate) type ReducedPixels = fn(&SourceImage, Input, [usize; 2]) -> Result<Photograph>;
 
-/// [`Reading::pixel_bytes`] of decoders that write samples as they are handed out: four channels of 8 bits, in the decoder and in the
-/// photograph, or once with 16 bits.
+/// [`Reading::pixel_bytes`] of decoders that write samples as they are handed out: four channels of 8 bits, in the
+/// decoder and in the photograph, or once with 16 bits.
 pub(crate) const PLAIN_PIXEL_BYTES: usize = 8;
 
 /// What is said of a file at which a decoder panicked.
@@ -108,7 +108,8 @@ impl Reading {
         contained(|| (self.pixels)(source, input)).unwrap_or_else(|words| Err(damaged(source, words)))
     }
 
-    /// What the field `reduced` reads of at least `least` columns and rows; all pixels where decoders make nothing smaller.
+    /// What the field `reduced` reads of at least `least` columns and rows; all pixels where decoders make nothing
+    /// smaller.
     pub(crate) fn reduced(&self, source: &SourceImage, input: Input, least: [usize; 2]) -> Result<Photograph> {
         let Some(reduced) = self.reduced else { return self.pixels(source, input) };
         contained(|| reduced(source, input, least)).unwrap_or_else(|words| Err(damaged(source, words)))
@@ -145,8 +146,8 @@ pub(crate) enum HeaderError {
 pub(crate) struct Foreign {
     /// What a file of it is, for messages.
     pub(crate) what: &'static str,
-    /// How the names of its files end, in lower case. In a folder such files are named in a rejection, while files that are
-    /// no photographs at all are passed over in silence.
+    /// How the names of its files end, in lower case. In a folder such files are named in a rejection, while files that
+    /// are no photographs at all are passed over in silence.
     pub(crate) extensions: &'static [&'static str],
     /// Whether a file that begins with these bytes, [`SIGNATURE_BYTES`] or all of a shorter file, is of this format.
     pub(crate) has_signature: fn(&[u8]) -> bool,
@@ -182,8 +183,8 @@ pub(crate) struct Writing {
     /// Memory beside the canvas, for docs/formats.md.
     #[cfg_attr(not(test), expect(dead_code, reason = "for the page of formats, which a test compares"))]
     pub(crate) memory: &'static str,
-    /// Bytes that a pixel of a panorama of photographs takes: exact where nothing is compressed and nothing transparent,
-    /// else at the low end, so that what is refused would not have fitted.
+    /// Bytes that a pixel of a panorama of photographs takes: exact where nothing is compressed and nothing
+    /// transparent, else at the low end, so that what is refused would not have fitted.
     pub(crate) bytes_per_pixel: fn(&OutputOptions) -> f64,
     pub(crate) writer: Writer,
 }

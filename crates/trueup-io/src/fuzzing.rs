@@ -1,4 +1,5 @@
-//! What photographs hold beside their pixels, read from memory: for `trueup-fuzz`, which cannot try enough of it through files.
+//! What photographs hold beside their pixels, read from memory: for `trueup-fuzz`, which cannot try enough of it
+//! through files.
 
 use crate::color::icc::understand;
 use crate::metadata::block::parsed;

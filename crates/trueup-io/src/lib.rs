@@ -1,6 +1,7 @@
 //! Files to memory and back: finding and decoding photographs, reading their metadata, writing panoramas.
 //!
-//! * [`source`] turns paths, folders and glob patterns into [`trueup_core::source::SourceImage`]s, reading headers only.
+//! * [`source`] turns paths, folders and glob patterns into [`trueup_core::source::SourceImage`]s, reading headers
+//!   only.
 //! * [`color`] finds out which colors they mean;
 //! * [`decode`] reads their pixels: whole photographs, and the reduced pictures that measurement works on.
 //! * [`provenance`] gathers what a panorama tells of its photographs;

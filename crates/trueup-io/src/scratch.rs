@@ -62,8 +62,8 @@ fn scratch_file(folder: &Path) -> Result<File> {
     tempfile::tempfile_in(folder).map_err(|error| takes_nothing(existing(folder), &error))
 }
 
-/// Refuses to put `needed` bytes of `what` into `folder` if its disk has not so much room. Where the operating system does
-/// not say how much there is, nothing is refused.
+/// Refuses to put `needed` bytes of `what` into `folder` if its disk has not so much room. Where the operating system
+/// does not say how much there is, nothing is refused.
 ///
 /// # Errors
 /// [`Error::Limits`] with the numbers.

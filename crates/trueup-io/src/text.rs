@@ -4,15 +4,15 @@ use std::fs::File;
 use std::io::{Error, ErrorKind, Read, Result};
 use std::path::Path;
 
-/// The most that is read of what is no regular file, a pipe or a device, which may never end, bytes: a gibibyte. The project of
-/// 38 photographs has 13 MB. Regular files end by themselves.
+/// The most that is read of what is no regular file, a pipe or a device, which may never end, bytes: a gibibyte. The
+/// project of 38 photographs has 13 MB. Regular files end by themselves.
 const LONGEST_STREAM: u64 = 1 << 30;
 
 /// The bytes of a file of text.
 ///
 /// # Errors
-/// Those of the operating system; [`ErrorKind::FileTooLarge`] if it is no regular file and goes on beyond a gibibyte, with the bound in
-/// words.
+/// Those of the operating system; [`ErrorKind::FileTooLarge`] if it is no regular file and goes on beyond a gibibyte,
+/// with the bound in words.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     let mut file = File::open(path)?;
     if !file.metadata()?.is_file() {

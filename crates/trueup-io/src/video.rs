@@ -34,8 +34,8 @@ const RATE: &str = "25";
 /// What the numbers of frames are called in the filters.
 const RENUMBERED: &str = "setpts=N/25/TB";
 
-/// A second output, which tells on standard error of each time that the filters begin: once, unless frames of another size or kind follow. Frames
-/// would be numbered anew from there.
+/// A second output, which tells on standard error of each time that the filters begin: once, unless frames of another
+/// size or kind follow. Frames would be numbered anew from there.
 const BEGINNINGS: [&str; 9] = [
     "-map",
     "0:v:0",
@@ -75,8 +75,8 @@ pub struct SmallFrame {
 /// Hands every frame of a video to `each`, in their order, made small.
 ///
 /// # Errors
-/// [`Error::Input`] if `ffmpeg` is not installed, or finds no frames, or there are more than 20,000, or they change their size;
-/// [`Error::Cancelled`].
+/// [`Error::Input`] if `ffmpeg` is not installed, or finds no frames, or there are more than 20,000, or they change
+/// their size; [`Error::Cancelled`].
 pub fn look_through(video: &Path, context: &StageContext, mut each: impl FnMut(&SmallFrame)) -> Result<()> {
     let filters = format!("{RENUMBERED},scale='min({SMALL_WIDTH},iw)':-2,format=gray");
     let output: Vec<OsString> =
@@ -102,7 +102,8 @@ pub fn look_through(video: &Path, context: &StageContext, mut each: impl FnMut(&
     end(running, video, count)
 }
 
-/// Writes frames of a video, by their numbers in ascending order, as PNG files into a folder, each under the name that `name` gives.
+/// Writes frames of a video, by their numbers in ascending order, as PNG files into a folder, each under the name that
+/// `name` gives.
 ///
 /// # Errors
 /// Those of [`look_through`]; [`Error::Io`] if a file cannot have its name.
@@ -189,8 +190,8 @@ fn failed(video: &Path, reason: &str) -> Error {
 /// The next picture of a stream of binary portable graymaps; `None` at its end.
 ///
 /// # Source
-/// Netpbm's description of the format: `P5`, width, height and greatest level in decimal digits, each followed by white space, then
-/// the levels.
+/// Netpbm's description of the format: `P5`, width, height and greatest level in decimal digits, each followed by white
+/// space, then the levels.
 fn read_gray(stream: &mut impl BufRead) -> std::result::Result<Option<SmallFrame>, String> {
     let unreadable = |error: std::io::Error| format!("its frames cannot be read: {error}");
     if stream.fill_buf().map_err(unreadable)?.is_empty() {

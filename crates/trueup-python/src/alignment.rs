@@ -22,9 +22,9 @@ pub(crate) struct Alignment {
     threads: usize,
 }
 
-/// Finds, measures, matches and aligns photographs: one alignment for the largest group of photographs that overlap, or with
-/// `all` one for each, the largest first. `progress` is called with a stage's name, the steps done, and how many there are;
-/// `workers` with what tasks have in common and with these, and gives their numbers and results.
+/// Finds, measures, matches and aligns photographs: one alignment for the largest group of photographs that overlap, or
+/// with `all` one for each, the largest first. `progress` is called with a stage's name, the steps done, and how many
+/// there are; `workers` with what tasks have in common and with these, and gives their numbers and results.
 #[pyfunction]
 pub(crate) fn align<'py>(
     py: Python<'py>,
@@ -54,8 +54,8 @@ pub(crate) fn align<'py>(
     Ok(aligned.alignments.into_iter().map(one).collect())
 }
 
-/// The geometry of the panorama that the project file at `path` records, over its photographs, or those of the same names in the
-/// folder `photographs`. With `relight`, the light of these is evened out anew.
+/// The geometry of the panorama that the project file at `path` records, over its photographs, or those of the same
+/// names in the folder `photographs`. With `relight`, the light of these is evened out anew.
 #[pyfunction]
 pub(crate) fn open_project<'py>(
     py: Python<'py>,

@@ -61,8 +61,8 @@ pub(crate) fn plan(py: Python<'_>, wishes: BatchWishes) -> PyResult<String> {
     run(py, Surroundings { progress: None, threads: 1 }, |context| Ok(batch_plan(&Batch::find(job, context)?)))
 }
 
-/// Stitches the sets of a batch; returns what became of all, in lines of JSON. `told` is called with the lines of each set when it is
-/// done.
+/// Stitches the sets of a batch; returns what became of all, in lines of JSON. `told` is called with the lines of each
+/// set when it is done.
 #[pyfunction]
 pub(crate) fn batch<'py>(
     py: Python<'py>,

@@ -31,8 +31,8 @@ pub(crate) struct Wishes {
 }
 
 impl Wishes {
-    /// What `keywords` wish of the subcommand `command`, beginning with `options`; the configuration file is overruled by
-    /// `set`, and this by the keywords of their own.
+    /// What `keywords` wish of the subcommand `command`, beginning with `options`; the configuration file is overruled
+    /// by `set`, and this by the keywords of their own.
     pub(crate) fn of(keywords: &Bound<'_, PyDict>, command: &str, options: StitchOptions) -> PyResult<Self> {
         let py = keywords.py();
         let mut wishes = Self {

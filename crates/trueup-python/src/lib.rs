@@ -1,7 +1,7 @@
 //! trueup for Python, the part that is not Python: arrays in and out, exceptions, progress, and the interpreter let go.
 //!
-//! The package that people import is in the folder `python`; it holds what needs no Rust. No algorithm and no default lives in
-//! either.
+//! The package that people import is in the folder `python`; it holds what needs no Rust. No algorithm and no default
+//! lives in either.
 
 mod alignment;
 mod batch;
@@ -15,8 +15,8 @@ mod workers;
 
 use pyo3::prelude::*;
 
-/// The native part of the package trueup. What it shares between threads is locked or never changed: the lock of the interpreter is not
-/// asked for.
+/// The native part of the package trueup. What it shares between threads is locked or never changed: the lock of the
+/// interpreter is not asked for.
 #[pymodule(gil_used = false)]
 mod _trueup {
     #[pymodule_export]

@@ -7,8 +7,8 @@ use trueup_cli::OPTION_FLAGS;
 use crate::errors::exception;
 use crate::keywords::keyword_of;
 
-/// Every option as JSON: an array of {name, default, allowed, unit, meaning, tier, choices}, and the defaults by table, whose
-/// types are those of the options.
+/// Every option as JSON: an array of {name, default, allowed, unit, meaning, tier, choices}, and the defaults by table,
+/// whose types are those of the options.
 #[pyfunction]
 pub(crate) fn options(py: Python<'_>) -> PyResult<(String, String)> {
     let written = |error| exception(py, Error::input("options", error, "Report this as a defect."));

@@ -77,8 +77,8 @@ impl Panorama {
 
 #[pymethods]
 impl Panorama {
-    /// Colors, height x width x 3, and opacity, height x width. Colors are encoded in 8 or 16 bits, or floating point numbers
-    /// of linear light; 0 where no photograph is.
+    /// Colors, height x width x 3, and opacity, height x width. Colors are encoded in 8 or 16 bits, or floating point
+    /// numbers of linear light; 0 where no photograph is.
     fn pixels<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let panorama = &self.rendered.panorama;
         match self.depth {
@@ -94,8 +94,8 @@ impl Panorama {
         }
     }
 
-    /// Writes the panorama to `path`, in the format that its extension names, and beside it what `beside` asks for by the
-    /// command's flags; returns the bytes of the panorama's file.
+    /// Writes the panorama to `path`, in the format that its extension names, and beside it what `beside` asks for by
+    /// the command's flags; returns the bytes of the panorama's file.
     fn save<'py>(
         &self,
         py: Python<'py>,

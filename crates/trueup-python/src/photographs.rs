@@ -65,7 +65,8 @@ fn raster<T: Element, S: Copy + Default>(
     Raster::from_data(width, height, channels, convert(samples))
 }
 
-/// Floating point values of encoded light, 0 to 1, as 16 bits; what is outside is cut off, and what is no number is black.
+/// Floating point values of encoded light, 0 to 1, as 16 bits; what is outside is cut off, and what is no number is
+/// black.
 fn sixteen_bits(name: &str, array: &PyReadonlyArrayDyn<'_, f32>) -> Result<Raster<u16>> {
     let full = f32::from(u16::MAX);
     if array.as_slice().is_ok_and(|samples| samples.iter().any(|&sample| sample >= TOO_BRIGHT)) {

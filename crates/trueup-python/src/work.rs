@@ -88,8 +88,8 @@ pub(crate) struct Surroundings<'py> {
     pub threads: usize,
 }
 
-/// What `work` comes to. Python goes on meanwhile: the interpreter is let go, and an interruption (Ctrl-C, or an exception in
-/// the progress callback) stops the work at its next check and is raised.
+/// What `work` comes to. Python goes on meanwhile: the interpreter is let go, and an interruption (Ctrl-C, or an
+/// exception in the progress callback) stops the work at its next check and is raised.
 pub(crate) fn run<T: Send>(
     py: Python<'_>,
     surroundings: Surroundings<'_>,

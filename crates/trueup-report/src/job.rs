@@ -34,7 +34,14 @@ const LEAST_SCALE: f64 = 1e-4;
 /// # let job = StitchJob { inputs: Inputs::new([room]), outputs, cache: None, threads: 0 };
 /// let project = job.run(&options, &context)?.remove(0).project;
 /// let folder = desk.path().to_owned();
-/// let job = ReportJob { name: "room".to_owned(), project, project_folder: folder, photographs: None, run: RunOptions::default(), threads: 0 };
+/// let job = ReportJob {
+///     name: "room".to_owned(),
+///     project,
+///     project_folder: folder,
+///     photographs: None,
+///     run: RunOptions::default(),
+///     threads: 0,
+/// };
 /// let page = job.run(&context)?;
 /// assert!(page.starts_with("<!DOCTYPE html>") && !page.contains("<script"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -45,7 +52,8 @@ pub struct ReportJob {
     pub name: String,
     /// The record of a stitch.
     pub project: Project,
-    /// The folder that the project's file lies in: recorded paths are looked up there first, then from the current folder.
+    /// The folder that the project's file lies in: recorded paths are looked up there first, then from the current
+    /// folder.
     pub project_folder: PathBuf,
     /// A folder that holds the photographs, if they moved.
     pub photographs: Option<PathBuf>,

@@ -1,8 +1,8 @@
 //! Why a panorama looks as it does, to be looked at.
 //!
-//! * [`drawings`]: what lies over a panorama or a photograph, as SVG: outlines, seams, lines by vanishing point, alignment
-//!   error, overlaps. Made from a [`trueup::Project`] alone, but for the seams, so that other fronts can lay them over any
-//!   picture of the panorama ([`drawings::Layer`] has them by name).
+//! * [`drawings`]: what lies over a panorama or a photograph, as SVG: outlines, seams, lines by vanishing point,
+//!   alignment error, overlaps. Made from a [`trueup::Project`] alone, but for the seams, so that other fronts can lay
+//!   them over any picture of the panorama ([`drawings::Layer`] has them by name).
 //! * [`charts`]: bars, lines and points on plain axes, as SVG.
 //! * [`ReportJob`]: the page of a panorama with all of these, one file that needs no network.
 //!

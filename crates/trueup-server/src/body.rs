@@ -1,5 +1,5 @@
-//! Bodies of requests: never longer than allowed, never slower than a person's own machine sends them. And files as bodies of
-//! answers, piece by piece.
+//! Bodies of requests: never longer than allowed, never slower than a person's own machine sends them. And files as
+//! bodies of answers, piece by piece.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -59,11 +59,12 @@ pub(crate) async fn read(body: Body, limit: u64) -> Result<Vec<u8>, Denial> {
     Ok(whole)
 }
 
-/// Writes a body of at most `limit` bytes to a new file; returns its length. Of a body that is refused nothing is left, nor of one whose sender
-/// goes away.
+/// Writes a body of at most `limit` bytes to a new file; returns its length. Of a body that is refused nothing is left,
+/// nor of one whose sender goes away.
 ///
 /// # Errors
-/// As [`read`], if the file cannot be written, and if there is one of that name: another request's, which stays as it is.
+/// As [`read`], if the file cannot be written, and if there is one of that name: another request's, which stays as it
+/// is.
 pub(crate) async fn save(body: Body, limit: u64, place: &Path) -> Result<u64, Denial> {
     let file = File::create_new(place).await.map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => {
@@ -156,7 +157,8 @@ mod tests {
         }
     }
 
-    /// The second of two of one name neither waits for the first nor takes its file away, and that of a sender who went away is gone.
+    /// The second of two of one name neither waits for the first nor takes its file away, and that of a sender who went
+    /// away is gone.
     #[test]
     fn a_file_is_one_requests_own_and_goes_with_it() {
         const SOON: Duration = Duration::from_millis(200);

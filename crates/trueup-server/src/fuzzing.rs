@@ -50,8 +50,8 @@ impl Unreachable {
         Ok(Self { runtime, router, credentials, patience, _studio: studio })
     }
 
-    /// Sends bytes as they are, from somebody who was not let in and who hangs up as soon as something is answered, or after a
-    /// tenth of the patience.
+    /// Sends bytes as they are, from somebody who was not let in and who hangs up as soon as something is answered, or
+    /// after a tenth of the patience.
     pub fn send(&self, bytes: &[u8]) -> Vec<u8> {
         self.talk(bytes, true)
     }
@@ -79,8 +79,8 @@ impl Unreachable {
         })
     }
 
-    /// Sends a request from the page itself. Its first line is followed by what browsers add: who they are, and how long the
-    /// `body` is.
+    /// Sends a request from the page itself. Its first line is followed by what browsers add: who they are, and how
+    /// long the `body` is.
     pub fn ask(&self, line: &[u8], body: &[u8]) -> Vec<u8> {
         let head = format!("\r\n{}Connection: close\r\nContent-Length: {}\r\n\r\n", self.credentials, body.len());
         self.talk(&[line, head.as_bytes(), body].concat(), false)

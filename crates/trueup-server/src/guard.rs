@@ -1,4 +1,5 @@
-//! Who is let in: one person, by a secret that the terminal printed or a password, from a page that this program served.
+//! Who is let in: one person, by a secret that the terminal printed or a password, from a page that this program
+//! served.
 //!
 //! Every request passes here before anything else looks at it. Whoever holds no session gets nothing but a denial.
 
@@ -19,8 +20,8 @@ use tokio::sync::Mutex;
 use crate::body;
 use crate::limits::{MAX_WISHES_BYTES, PASSWORD_PAUSE};
 
-/// Scripts, styles and pictures of this program alone, none of them in the page itself, and no frame around it. Viewers make
-/// pictures of data they hold.
+/// Scripts, styles and pictures of this program alone, none of them in the page itself, and no frame around it. Viewers
+/// make pictures of data they hold.
 const CONTENT_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
     img-src 'self' blob: data:; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
@@ -186,8 +187,8 @@ async fn decide(guard: &Guard, request: Request, next: Next) -> Response {
     next.run(request).await
 }
 
-/// Whether a request comes from a page that this server served. What changes anything must say so; what only looks may be
-/// silent about it, as when an address is opened.
+/// Whether a request comes from a page that this server served. What changes anything must say so; what only looks may
+/// be silent about it, as when an address is opened.
 fn is_own_origin(request: &Request, host: &str) -> bool {
     let headers = request.headers();
     let looks = matches!(*request.method(), Method::GET | Method::HEAD);

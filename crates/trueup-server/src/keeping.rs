@@ -1,5 +1,5 @@
-//! What a saved project needs when this program has ended: masks that were painted and photographs that were dropped lie in a
-//! temporary folder until then, so that they are put beside the project, which names them there.
+//! What a saved project needs when this program has ended: masks that were painted and photographs that were dropped
+//! lie in a temporary folder until then, so that they are put beside the project, which names them there.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,9 +20,10 @@ pub(crate) struct Companions {
 }
 
 impl Companions {
-    /// Those of the project of a panorama whose file is called `panorama`; `dropped` is where dropped photographs lie. In `among`, a
-    /// folder of photographs, masks have a folder of their own: they are no photographs. What is to be fetched lies side by side, masks
-    /// beside the project, and dropped photographs stay where whoever dropped them has them.
+    /// Those of the project of a panorama whose file is called `panorama`; `dropped` is where dropped photographs lie.
+    /// In `among`, a folder of photographs, masks have a folder of their own: they are no photographs. What is to be
+    /// fetched lies side by side, masks beside the project, and dropped photographs stay where whoever dropped them has
+    /// them.
     pub(crate) fn of(project: &Project, panorama: &str, dropped: &Path, among: Option<&Path>) -> Self {
         let stem = panorama.rsplit_once('.').map_or(panorama, |(stem, _)| stem);
         let folder = format!("{stem}-masks");

@@ -16,8 +16,9 @@ pub(crate) struct Underlay {
 }
 
 impl Underlay {
-    /// That of what was `rendered` of `alignment`. Where this view could not be measured, because the panorama was opened from a
-    /// record, measures are those of the view in which it was `stitched`: points and lines then lie where this view shows them.
+    /// That of what was `rendered` of `alignment`. Where this view could not be measured, because the panorama was
+    /// opened from a record, measures are those of the view in which it was `stitched`: points and lines then lie where
+    /// this view shows them.
     pub(crate) fn of(alignment: &Alignment, rendered: &Rendered, stitched: &Project) -> Self {
         let shown = alignment.shown(rendered, seams_size(alignment.project.canvas));
         let is_measured_elsewhere = alignment.project.measures.is_none() && stitched.measures.is_some();

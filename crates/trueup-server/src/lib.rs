@@ -1,12 +1,12 @@
 //! A page to stitch in, for one person on their own machine: what `trueup serve` runs.
 //!
-//! The page shows the photographs of a folder with what became of each, the panorama, large, and the choices that the options
-//! declare; it asks this server, and this server asks the library. No algorithm and no default lives in either.
+//! The page shows the photographs of a folder with what became of each, the panorama, large, and the choices that the
+//! options declare; it asks this server, and this server asks the library. No algorithm and no default lives in either.
 //!
-//! **Nobody else gets in.** The server listens on this machine alone, unless a password is given. Every request passes the
-//! guard: it must name the server as the browser was told to, come from the page itself, and hold the session that only
-//! the address printed in the terminal, or the password, opens. Requests name no paths; what is read lies in the folder opened
-//! or was dropped on the page; and all that is sent has a limit.
+//! **Nobody else gets in.** The server listens on this machine alone, unless a password is given. Every request passes
+//! the guard: it must name the server as the browser was told to, come from the page itself, and hold the session that
+//! only the address printed in the terminal, or the password, opens. Requests name no paths; what is read lies in the
+//! folder opened or was dropped on the page; and all that is sent has a limit.
 #![forbid(unsafe_code)]
 
 mod body;
@@ -100,8 +100,8 @@ impl Serving {
     }
 }
 
-/// Serves the page until `cancel` is cancelled. `told` is called once, with the address to open, when the server listens.
-/// Temporary files are gone when it returns.
+/// Serves the page until `cancel` is cancelled. `told` is called once, with the address to open, when the server
+/// listens. Temporary files are gone when it returns.
 ///
 /// # Errors
 /// [`Error::Input`] for a short password; [`Error::Io`] if the folder cannot be opened, or nobody can listen there.

@@ -1,5 +1,5 @@
-//! From wishes to panoramas: stitched, drawn small, cut into tiles, written to files. All of it is the library's work; what
-//! is said here is what of it is asked for.
+//! From wishes to panoramas: stitched, drawn small, cut into tiles, written to files. All of it is the library's work;
+//! what is said here is what of it is asked for.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};

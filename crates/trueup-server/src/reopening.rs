@@ -11,15 +11,16 @@ use trueup::{
 use crate::making::{Kept, keep};
 use crate::studio::{History, Listed, PaintedMasks, Studio, Wishes, is_offered};
 
-/// Opens the project in `text`, of a file called `name`, in the folder that is open if there is one. What was dropped and is a mask of
-/// the project is no photograph from then on.
+/// Opens the project in `text`, of a file called `name`, in the folder that is open if there is one. What was dropped
+/// and is a mask of the project is no photograph from then on.
 ///
 /// # Errors
 /// [`Error::Input`] if it is none, or names photographs that are neither in the folder opened nor dropped; those of
 /// [`Stitcher::reopen`].
 pub(crate) fn reopen(studio: &Studio, text: &str, name: &str, context: &StageContext) -> Result<()> {
     let mut project = Project::from_json(text, name)?;
-    // What a file of somebody else says of this machine is not heeded: where scratch files lie, how much memory is taken.
+    // What a file of somebody else says of this machine is not heeded: where scratch files lie, how much memory is
+    // taken.
     project.options.run = RunOptions::default();
     let (listed, folder) = {
         let state = studio.state();
@@ -106,8 +107,8 @@ struct Places<'a> {
 }
 
 impl Places<'_> {
-    /// The file of a mask: beside the project as recorded, as recorded, beside the project by its name alone, as the command looks for
-    /// it, or among what was dropped.
+    /// The file of a mask: beside the project as recorded, as recorded, beside the project by its name alone, as the
+    /// command looks for it, or among what was dropped.
     fn mask(&self, record: &MaskRecord) -> Result<PathBuf> {
         let beside = |name: &str| Some(self.folder?.join(name));
         let places = [beside(&record.path), Some(PathBuf::from(&record.path)), beside(record.file_name())];

@@ -1,4 +1,5 @@
-//! Files that are made to harm: scripts in their names and in what they say of themselves, and pictures that would fill the memory.
+//! Files that are made to harm: scripts in their names and in what they say of themselves, and pictures that would fill
+//! the memory.
 
 use std::path::Path;
 

@@ -181,7 +181,8 @@ fn photographs_are_shown_dropped_left_out_and_painted_on() {
     assert_eq!(listed(&server.get("/api/news").json(), 0)["used_mask"], Value::Null);
 }
 
-/// Folders are opened by their paths from the first one, which the page is told: one of the same name elsewhere is not meant.
+/// Folders are opened by their paths from the first one, which the page is told: one of the same name elsewhere is not
+/// meant.
 #[test]
 fn folders_in_folders_are_opened() {
     let desk = tempfile::tempdir().expect("a folder");
@@ -360,8 +361,8 @@ fn masks_lie_beside_the_project_that_names_them() {
     assert_eq!(Server::of(desk.path()).get("/api/news").json()["photographs"].as_array().map(Vec::len), Some(5));
 }
 
-/// The same of photographs that were dropped: in a folder they are copied beside the project; of a project that is fetched, they are
-/// looked for beside it.
+/// The same of photographs that were dropped: in a folder they are copied beside the project; of a project that is
+/// fetched, they are looked for beside it.
 #[test]
 fn dropped_photographs_outlive_the_program() {
     let (source, opened, elsewhere) =
@@ -470,7 +471,8 @@ fn exposures_of_brackets_go_with_their_photographs() {
     assert!(composed(&opened.path().join("pano.json"), elsewhere.path()) == picture, "nothing is missing");
 }
 
-/// Two masks of one kind count together, in whatever is stitched and saved again; of a photograph that is gone, nothing is asked for.
+/// Two masks of one kind count together, in whatever is stitched and saved again; of a photograph that is gone, nothing
+/// is asked for.
 #[test]
 fn all_masks_of_a_project_are_kept() {
     let (desk, elsewhere) = (room(), tempfile::tempdir().expect("a folder"));

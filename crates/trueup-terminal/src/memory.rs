@@ -1,9 +1,10 @@
 //! The end of a program that is refused memory it cannot do without: by an error, and with nothing half done.
 //!
-//! Rust ends such a program by SIGABRT, wherever in whichever library it was, and lets nobody else have a say. What depends on the
-//! input is asked for ahead of the work, or in a way that may fail; the thousand other places, most of them in libraries, have
-//! this one answer: the allocator notes what was refused, and SIGABRT is caught. It is raised by the thread that asked for the
-//! memory, in the middle of nothing: no lock of the allocator is held, and files can be removed.
+//! Rust ends such a program by SIGABRT, wherever in whichever library it was, and lets nobody else have a say. What
+//! depends on the input is asked for ahead of the work, or in a way that may fail; the thousand other places, most of
+//! them in libraries, have this one answer: the allocator notes what was refused, and SIGABRT is caught. It is raised
+//! by the thread that asked for the memory, in the middle of nothing: no lock of the allocator is held, and files can
+//! be removed.
 //!
 //! This belongs to a program, not to a library: only a binary has an allocator and signals to itself.
 #![allow(unsafe_code)] // An allocator and a handler of a signal; every other module is safe code.
@@ -22,8 +23,8 @@ use crate::request::LastResort;
 pub struct NotingAllocator;
 
 thread_local! {
-    /// Bytes of this thread's last allocation that was refused; 0 for none. Without a destructor, so that it can be reached
-    /// from an allocator.
+    /// Bytes of this thread's last allocation that was refused; 0 for none. Without a destructor, so that it can be
+    /// reached from an allocator.
     static REFUSED: Cell<usize> = const { Cell::new(0) };
     /// Whether this thread is about to end the program.
     static ENDS: Cell<bool> = const { Cell::new(false) };
@@ -65,9 +66,9 @@ unsafe impl GlobalAlloc for NotingAllocator {
     }
 }
 
-/// Gives back to the system what was freed, where that is much. The C library keeps what lies between pieces that are still held, in case it
-/// is wanted again; of stages that are over, most is not. To be called between stages: it takes some milliseconds, and what is wanted
-/// again is cleared again. Elsewhere than with glibc nothing is done.
+/// Gives back to the system what was freed, where that is much. The C library keeps what lies between pieces that are
+/// still held, in case it is wanted again; of stages that are over, most is not. To be called between stages: it takes
+/// some milliseconds, and what is wanted again is cleared again. Elsewhere than with glibc nothing is done.
 pub fn give_back() {
     /// Bytes that are worth it: what the working copies of a photograph or two take.
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
@@ -100,15 +101,16 @@ static IS_ENDING: AtomicBool = AtomicBool::new(false);
 /// How long a second thread that is refused memory waits for the first one to end the program.
 const OTHERS_WAIT: Duration = Duration::from_secs(10);
 
-/// Has a program whose allocator is [`NotingAllocator`] end so where it would be aborted for want of memory. Other reasons to abort
-/// are left as they are. The first call counts. Where signals are unknown, or this one cannot be caught, nothing changes.
+/// Has a program whose allocator is [`NotingAllocator`] end so where it would be aborted for want of memory. Other
+/// reasons to abort are left as they are. The first call counts. Where signals are unknown, or this one cannot be
+/// caught, nothing changes.
 pub fn end_without_memory(answer: WithoutMemory) {
     if ANSWER.set(answer).is_err() {
         return;
     }
     #[cfg(unix)]
-    // SAFETY: for this reason the signal is raised by the thread itself, which holds no lock that the handler takes for longer
-    // than it can wait; for any other reason the handler returns at once.
+    // SAFETY: for this reason the signal is raised by the thread itself, which holds no lock that the handler takes for
+    // longer than it can wait; for any other reason the handler returns at once.
     drop(unsafe { signal_hook::low_level::register(signal_hook::consts::SIGABRT, end) });
 }
 

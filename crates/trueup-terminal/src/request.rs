@@ -14,8 +14,8 @@ pub(crate) const STATUS_INTERRUPTED: u8 = 130;
 /// The exit status by the request to stop that came first.
 static STATUS: AtomicU8 = AtomicU8::new(STATUS_INTERRUPTED);
 
-/// How long work that was asked to stop may take to do so, where there is a [`LastResort`]. Decoders and solvers of other
-/// people's making look at no token; people press Ctrl-C again after a second.
+/// How long work that was asked to stop may take to do so, where there is a [`LastResort`]. Decoders and solvers of
+/// other people's making look at no token; people press Ctrl-C again after a second.
 const PATIENCE: Duration = Duration::from_millis(700);
 
 /// What is to be done before the program ends without waiting for its work any longer.
@@ -26,8 +26,8 @@ pub type LastResort = fn();
 pub enum Ending {
     /// When its work has stopped, however long that takes. A second request of any kind ends it at once.
     WhenStopped,
-    /// By itself within a second, whatever its work does, and with something to clean up first. A second Ctrl-C ends it at once; a second
-    /// request of another kind changes nothing.
+    /// By itself within a second, whatever its work does, and with something to clean up first. A second Ctrl-C ends it
+    /// at once; a second request of another kind changes nothing.
     Soon,
     /// When its work has stopped, or by the last resort within a second. A second request is as for [`Self::Soon`].
     By(LastResort),

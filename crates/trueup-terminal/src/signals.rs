@@ -10,8 +10,9 @@ use crate::request::StopRequest;
 /// What shells add to a signal's number for the exit status of the program that it ended.
 const STATUS_OF_SIGNALS: i32 = 128;
 
-/// Has `request` made by SIGTERM, and by SIGHUP unless it is ignored. SIGXFSZ is caught as well and does nothing, so that a file that grows beyond
-/// the limit of its size (`ulimit -f`) fails the write with an error, which removes what was written of it, in place of ending the program.
+/// Has `request` made by SIGTERM, and by SIGHUP unless it is ignored. SIGXFSZ is caught as well and does nothing, so
+/// that a file that grows beyond the limit of its size (`ulimit -f`) fails the write with an error, which removes what
+/// was written of it, in place of ending the program.
 ///
 /// # Errors
 /// Those of the operating system.
@@ -29,8 +30,9 @@ pub(crate) fn catch(request: StopRequest) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether SIGHUP is known not to be ignored: `nohup` starts programs with it ignored, and catching it would undo that. Where
-/// the kernel does not tell, it is left as it is: it ends the program or does nothing, as whoever started it decided.
+/// Whether SIGHUP is known not to be ignored: `nohup` starts programs with it ignored, and catching it would undo that.
+/// Where the kernel does not tell, it is left as it is: it ends the program or does nothing, as whoever started it
+/// decided.
 fn heeds_hangup() -> bool {
     std::fs::read_to_string("/proc/self/status").ok().and_then(|status| ignored(&status)).is_some_and(|ignored| {
         let hangup = 1 << (SIGHUP - 1);

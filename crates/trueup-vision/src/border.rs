@@ -1,5 +1,5 @@
-//! Even borders around photographs: the paper around a scanned print, the bars above and below a film, a frame drawn by a program.
-//! What lies in them is no part of the scene, but has the sharpest edges of all.
+//! Even borders around photographs: the paper around a scanned print, the bars above and below a film, a frame drawn by
+//! a program. What lies in them is no part of the scene, but has the sharpest edges of all.
 
 use serde::{Deserialize, Serialize};
 use trueup_core::inset::Inset;
@@ -12,8 +12,8 @@ pub(crate) const EVEN: f32 = 10.0;
 const MOST_OF_A_LINE: f64 = 0.9;
 /// Least difference of the photograph from the border beside it, in gray levels.
 pub(crate) const STEP: f32 = 20.0;
-/// Share of a border along which the photograph must differ from it. A night lies behind black bars in part; where a blown sky ends
-/// at a skyline, next to nothing of its last line does.
+/// Share of a border along which the photograph must differ from it. A night lies behind black bars in part; where a
+/// blown sky ends at a skyline, next to nothing of its last line does.
 const DIFFERS: f64 = 0.5;
 /// Lines between the last one of a border and the photograph as it is: sharp edges are spread over them by scaling.
 const TRANSITION: usize = 2;
@@ -35,8 +35,9 @@ pub struct EvenBorder {
 
 /// Looks for a border around the photograph in a picture of gray values from 0 to 255.
 ///
-/// A border has one level and ends along a straight line parallel to the side, behind which most of the picture differs from it.
-/// It counts only together with one of the same level at the opposite side: a blown sky above a level sea has that line, too.
+/// A border has one level and ends along a straight line parallel to the side, behind which most of the picture differs
+/// from it. It counts only together with one of the same level at the opposite side: a blown sky above a level sea has
+/// that line, too.
 pub fn even_border(gray: &Raster<f32>) -> EvenBorder {
     let [columns, rows] = [Line::Column, Line::Row].map(|line| {
         let sides = [false, true].map(|from_end| Side { gray, line, from_end }.even_lines().unwrap_or_default());

@@ -1,8 +1,8 @@
-//! What belongs to what carries the camera: a bonnet, the legs of a drone, a window's frame. Every photograph shows it at the same place, whatever
-//! the camera looks at, and it matches better than anything in the scene.
+//! What belongs to what carries the camera: a bonnet, the legs of a drone, a window's frame. Every photograph shows it
+//! at the same place, whatever the camera looks at, and it matches better than anything in the scene.
 //!
-//! Two photographs alone do not tell it from what a view and its exposures have in common; all of them do: it stands still in every pair,
-//! and nothing else does in any.
+//! Two photographs alone do not tell it from what a view and its exposures have in common; all of them do: it stands
+//! still in every pair, and nothing else does in any.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,29 +20,33 @@ use crate::squares::{SQUARE_PX, STILL_PX, Square, featured, square};
 const FEWEST_PHOTOGRAPHS: usize = 3;
 /// Most photographs that are compared, spread evenly over the set: 66 pairs.
 const MOST_COMPARED: usize = 12;
-/// Largest squared distance of descriptors of one thing in two photographs, of those of length 512. Noise and compression move them by half of that
-/// (300 squared); two things at one place by chance differ by more than 400 squared.
+/// Largest squared distance of descriptors of one thing in two photographs, of those of length 512. Noise and
+/// compression move them by half of that (300 squared); two things at one place by chance differ by more than 400
+/// squared.
 const SAME_DESCRIPTOR: u32 = 90_000;
-/// Least share of the squares with features of both photographs in which some stand still for the two to show one view. Of what carries a
-/// camera more than this is not told.
+/// Least share of the squares with features of both photographs in which some stand still for the two to show one view.
+/// Of what carries a camera more than this is not told.
 const SAME_VIEW: f64 = 0.5;
 /// Fewest pairs of different views that tell a carrier.
 const FEWEST_PAIRS: usize = 3;
-/// Least share of the pairs that show features in a square in which some stand still there, for it to be the carrier's. Measured on 44 sets with a
-/// carrier drawn in, 85 without and 31 photographed ones: nearly all of its squares have more than 0.8, the scene's less than 0.2.
+/// Least share of the pairs that show features in a square in which some stand still there, for it to be the carrier's.
+/// Measured on 44 sets with a carrier drawn in, 85 without and 31 photographed ones: nearly all of its squares have
+/// more than 0.8, the scene's less than 0.2.
 const OFTEN_STILL: f64 = 0.75;
 /// The same beside a square of the carrier's: its edge, behind which the scene changes.
 const STILL_BESIDE: f64 = 0.4;
 /// Least share of the squares with features that is a carrier; less is [written](crate::matching), or met by chance.
 const LEAST_SHARE: f64 = 0.05;
-/// Squares from a photograph's border within which a carrier begins. What stands still farther inside is what a camera moves towards, or turns about.
+/// Squares from a photograph's border within which a carrier begins. What stands still farther inside is what a camera
+/// moves towards, or turns about.
 const FROM_BORDER: i64 = 2;
 
-/// Where photographs of one size, numbered in `photographs`, show what carries the camera, in working pixels of their common `frame`; `None` where
-/// nothing tells it.
+/// Where photographs of one size, numbered in `photographs`, show what carries the camera, in working pixels of their
+/// common `frame`; `None` where nothing tells it.
 ///
 /// # Errors
-/// Those of `features`; [`trueup_core::Error::Input`] where features contradict themselves; [`trueup_core::Error::Cancelled`].
+/// Those of `features`; [`trueup_core::Error::Input`] where features contradict themselves;
+/// [`trueup_core::Error::Cancelled`].
 pub fn find(
     features: &dyn FeatureSource,
     photographs: &[usize],
@@ -147,7 +151,8 @@ fn is_at_border([column, row]: Square, frame: &WorkingFrame) -> bool {
     is_near(column, frame.width) || is_near(row, frame.height)
 }
 
-/// The first squares and all `others` that lie side by side, or corner by corner, with one of them, or with one that does.
+/// The first squares and all `others` that lie side by side, or corner by corner, with one of them, or with one that
+/// does.
 fn joined(first: impl Iterator<Item = Square>, others: &BTreeSet<Square>) -> BTreeSet<Square> {
     let mut joined: BTreeSet<Square> = first.collect();
     let mut open: Vec<Square> = joined.iter().copied().collect();
@@ -249,8 +254,8 @@ mod tests {
         values
     }
 
-    /// A feature in each square of 40 px, its number by what is seen there: `moved` says by how many squares the scene has moved, and where it has
-    /// not, what is seen stands still.
+    /// A feature in each square of 40 px, its number by what is seen there: `moved` says by how many squares the scene
+    /// has moved, and where it has not, what is seen stands still.
     fn photograph(moved: i64, is_still: impl Fn([i64; 2]) -> bool) -> Features {
         let mut features = Features::default();
         for row in 0..15_i64 {

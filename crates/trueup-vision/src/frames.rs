@@ -1,4 +1,5 @@
-//! Which frames of a video a panorama needs: so far apart that all overlap well, and of those that could be taken the sharpest.
+//! Which frames of a video a panorama needs: so far apart that all overlap well, and of those that could be taken the
+//! sharpest.
 
 /// Side in pixels of the squares of a frame that are averaged for following its motion.
 const BLOCK_PX: usize = 6;
@@ -6,19 +7,19 @@ const BLOCK_PX: usize = 6;
 /// Radius in blocks of the surroundings whose mean is taken away, so that neither exposure nor light counts.
 const SURROUNDINGS: usize = 3;
 
-/// Blocks by which a frame may lie elsewhere than the motion so far foretells: of a frame 80 blocks wide a twelfth, a camera that
-/// turns by two of its views a second.
+/// Blocks by which a frame may lie elsewhere than the motion so far foretells: of a frame 80 blocks wide a twelfth, a
+/// camera that turns by two of its views a second.
 const REACH: isize = 6;
 
-/// Difference of two frames, as a share of what they show themselves, from which on they do not show the same: what is drawn at random
-/// differs by three quarters, what moved by a tenth to a third.
+/// Difference of two frames, as a share of what they show themselves, from which on they do not show the same: what is
+/// drawn at random differs by three quarters, what moved by a tenth to a third.
 const LOST: f64 = 0.5;
 
 /// Least share of a frame that two must have in common to be compared.
 const LEAST_COMMON: f64 = 0.25;
 
-/// Overlap with the frame before at which one may be taken, and below which one must be: as much as photographs by hand have, so that every
-/// feature is seen in two or three.
+/// Overlap with the frame before at which one may be taken, and below which one must be: as much as photographs by hand
+/// have, so that every feature is seen in two or three.
 const OVERLAPS: [f64; 2] = [0.5, 0.75];
 
 /// Overlap with the last frame taken up to which the end of a video shows something new.
@@ -35,8 +36,8 @@ struct FollowedFrame {
 
 /// Follows the frames of a video, one after the other.
 ///
-/// Frames are moved, never turned or scaled: what is wanted is how much of one is still in the other. Memory grows by 7 KB a frame of
-/// 480 x 270 pixels.
+/// Frames are moved, never turned or scaled: what is wanted is how much of one is still in the other. Memory grows by 7
+/// KB a frame of 480 x 270 pixels.
 #[derive(Debug)]
 pub struct FrameChooser {
     columns: usize,
@@ -134,7 +135,8 @@ impl FrameChooser {
         frames.map(|(frame, _)| frame).reduce(sharper)
     }
 
-    /// The frames from `first` on, and which share of each shows what `first` does; 0 for those that cannot be found in it.
+    /// The frames from `first` on, and which share of each shows what `first` does; 0 for those that cannot be found in
+    /// it.
     fn those_that_overlap(&self, first: usize) -> impl Iterator<Item = (usize, f64)> {
         let mut shift = [0_isize; 2];
         let mut speed = [0_isize; 2];
@@ -149,8 +151,8 @@ impl FrameChooser {
         })
     }
 
-    /// By how many blocks `second` lies right of and below `first`: near `expected` where they differ least, or else anywhere; `None` if they do
-    /// not show the same.
+    /// By how many blocks `second` lies right of and below `first`: near `expected` where they differ least, or else
+    /// anywhere; `None` if they do not show the same.
     fn shift(&self, first: usize, second: usize, expected: [isize; 2]) -> Option<[isize; 2]> {
         let (first, second) = (&self.frames[first].blocks, &self.frames[second].blocks);
         let shown = |blocks: &[i16]| blocks.iter().map(|block| f64::from(block.unsigned_abs())).sum::<f64>();

@@ -7,8 +7,8 @@ use crate::features::FeaturePoint;
 /// Side of a square, working pixels.
 pub(crate) const SQUARE_PX: f64 = 40.0;
 
-/// Farthest that a place of something fixed to the camera, or written on photographs, is from where it is in another one, working pixels: what
-/// shines through moves its corners.
+/// Farthest that a place of something fixed to the camera, or written on photographs, is from where it is in another
+/// one, working pixels: what shines through moves its corners.
 pub(crate) const STILL_PX: f64 = 1.5;
 
 /// A square: its column and its row.

@@ -1,6 +1,7 @@
 //! How true panoramas are to their photographs with each way of blending: steps across seams and ghosts.
 //!
-//! `cargo run --release -p trueup --example composites -- SCALE [OPTION=VALUE...] FOLDER...` prints a line per folder and way.
+//! `cargo run --release -p trueup --example composites -- SCALE [OPTION=VALUE...] FOLDER...` prints a line per folder
+//! and way.
 
 use trueup::{Inputs, StageContext, StitchOptions, Stitcher};
 

@@ -1,5 +1,5 @@
-//! What a cache keeps, read from memory: for `trueup-fuzz`. Behind a checksum nothing but what was written is ever read, and
-//! mutations would not get there.
+//! What a cache keeps, read from memory: for `trueup-fuzz`. Behind a checksum nothing but what was written is ever
+//! read, and mutations would not get there.
 
 use std::io::ErrorKind;
 

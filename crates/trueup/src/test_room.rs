@@ -23,8 +23,9 @@ pub(crate) fn room_in_memory(changed: impl Fn(Photograph) -> Photograph) -> Inpu
     Inputs { in_memory, ..Inputs::new(files.iter().map(|file| file.name.clone())) }
 }
 
-/// Features of which noise and what sharpening makes of it leave too few for the last photograph of [`room_with_a_blurred_photograph`]: 4 to 7 of its
-/// matches agree at the first look. In the room there is little that is fine, so that there would be room in the usual 4000.
+/// Features of which noise and what sharpening makes of it leave too few for the last photograph of
+/// [`room_with_a_blurred_photograph`]: 4 to 7 of its matches agree at the first look. In the room there is little that
+/// is fine, so that there would be room in the usual 4000.
 pub(crate) const TOO_FEW_FEATURES: &str = "features.max_points=800";
 
 /// The room's photographs in memory, the last one blurred, noisy and then sharpened, as by a telephone that was shaken.

@@ -26,20 +26,20 @@ pub(crate) struct Arguments {
 pub(crate) enum BenchCommand {
     /// Run the paper's experiments and our own, and write one report
     ///
-    /// Writes report.md, report.html with its figures, a CSV file per table and every single result (rows.jsonl, rows.csv), and
-    /// says of which commit the program was built. A run that was stopped goes on with the results that it stored; those of
-    /// another build are refused.
+    /// Writes report.md, report.html with its figures, a CSV file per table and every single result (rows.jsonl,
+    /// rows.csv), and says of which commit the program was built. A run that was stopped goes on with the results that
+    /// it stored; those of another build are refused.
     Paper(PaperArguments),
     /// Stitch real sets and sets with known cameras, and write the table of quality
     ///
-    /// Each set is stitched by the `trueup` command in a process of its own. The figures go between the markers of the Markdown
-    /// file, whose other words stay, and into a CSV file beside it, which the next run compares with.
+    /// Each set is stitched by the `trueup` command in a process of its own. The figures go between the markers of the
+    /// Markdown file, whose other words stay, and into a CSV file beside it, which the next run compares with.
     Quality(QualityArguments),
     /// Time `trueup stitch` on folders of photographs, beside other stitchers that are installed
     ///
-    /// Runs the programs in turn, whole processes from the photographs' files to a JPEG, and prints a Markdown table of medians:
-    /// seconds of the clock and of all processors, peak memory, and trueup's share of the others'. Leave the machine alone
-    /// meanwhile.
+    /// Runs the programs in turn, whole processes from the photographs' files to a JPEG, and prints a Markdown table of
+    /// medians: seconds of the clock and of all processors, peak memory, and trueup's share of the others'. Leave the
+    /// machine alone meanwhile.
     Speed(SpeedArguments),
 }
 
@@ -69,7 +69,8 @@ pub(crate) struct PaperArguments {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub only: Vec<String>,
 
-    /// Folder of photographs whose cameras are not known, or of such folders, as those of the GSP data set; may be repeated
+    /// Folder of photographs whose cameras are not known, or of such folders, as those of the GSP data set; may be
+    /// repeated
     #[arg(long, value_name = "DIR", num_args = 1..)]
     pub photographs: Vec<PathBuf>,
 

@@ -1,7 +1,7 @@
 //! Of which sources this program was built.
 
-/// What tells one build from another. Found when the program is built (`build.rs`), not when it runs: a checkout may have
-/// moved on since.
+/// What tells one build from another. Found when the program is built (`build.rs`), not when it runs: a checkout may
+/// have moved on since.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct BuildStamp {
     /// The commit that was checked out; empty if the sources were no checkout, or git was not there.

@@ -26,8 +26,8 @@ pub(crate) struct EndedChild {
 /// How often a running process is looked after.
 const POLL: Duration = Duration::from_millis(2);
 
-/// Runs a program and waits for its end. It reads nothing; what it prints is dropped, what it complains of goes by way of a file
-/// in the folder `scratch`.
+/// Runs a program and waits for its end. It reads nothing; what it prints is dropped, what it complains of goes by way
+/// of a file in the folder `scratch`.
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be started; [`Error::Cancelled`], after it was ended.

@@ -1,4 +1,5 @@
-//! The `trueup-bench` command: experiments on sets with known cameras, the table of quality, and speed beside other stitchers.
+//! The `trueup-bench` command: experiments on sets with known cameras, the table of quality, and speed beside other
+//! stitchers.
 #![forbid(unsafe_code)]
 
 mod arguments;

@@ -6,15 +6,16 @@ use std::path::Path;
 use serde_json::Value;
 use trueup::{Error, Project, Result, StageContext, Truth};
 
-/// The name of the local distortion that the experiments state: of the cells that lie with their centers and all their corners in no
-/// other photograph (equations 12 and 13). Known with the truth; what a panorama says of itself, `ld`, judges cells by their centers.
+/// The name of the local distortion that the experiments state: of the cells that lie with their centers and all their
+/// corners in no other photograph (equations 12 and 13). Known with the truth; what a panorama says of itself, `ld`,
+/// judges cells by their centers.
 pub(crate) const LD: &str = "ld_corners";
 
-/// Everything that is measured of a panorama: the gate's numbers, what the panorama's own lines and matches say, and with
-/// known cameras the numbers of [`trueup::evaluate`].
+/// Everything that is measured of a panorama: the gate's numbers, what the panorama's own lines and matches say, and
+/// with known cameras the numbers of [`trueup::evaluate`].
 ///
-/// `accepted`: the dominant directions guide; `guided`: they or the vertical alone do. `lean_deg`, `estimated_gdic_deg` and
-/// `certain` are told by the lines of all photographs, without the truth. What could not be measured is absent.
+/// `accepted`: the dominant directions guide; `guided`: they or the vertical alone do. `lean_deg`, `estimated_gdic_deg`
+/// and `certain` are told by the lines of all photographs, without the truth. What could not be measured is absent.
 ///
 /// # Errors
 /// Those of [`trueup::evaluate`].

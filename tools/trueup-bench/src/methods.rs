@@ -33,7 +33,8 @@ pub(crate) enum Family {
     Prior,
     /// A prior in another reading of its publication: on whole sets, in the comparison of methods alone.
     Reading,
-    /// VPG, by default or as published, with more energies that draw overlaps together: on whole sets, in the table of alignment.
+    /// VPG, by default or as published, with more energies that draw overlaps together: on whole sets, in the table of
+    /// alignment.
     Alignment,
     /// Warps without a prior that cannot show a wide field of view: on reduced sets alone.
     Warp,
@@ -41,8 +42,8 @@ pub(crate) enum Family {
     WideWarp,
 }
 
-/// What every method is seen on: the mesh that it solved. A projection is drawn from the cameras, which all methods have
-/// alike, and would hide what is compared.
+/// What every method is seen on: the mesh that it solved. A projection is drawn from the cameras, which all methods
+/// have alike, and would hide what is compared.
 pub(crate) const VIEW: &str = "projection.kind=mesh";
 
 /// The name of the default method in [`METHODS`].

@@ -184,8 +184,8 @@ fn conclude(arguments: &PaperArguments, claims: &[Claim], seconds: f64) -> ExitC
     }
 }
 
-/// Whether every claim holds that is expected to: of a quick run those of [`QUICK_CLAIMS`], each of which must have been
-/// tried unless its experiment was not asked for; of others all that were tried.
+/// Whether every claim holds that is expected to: of a quick run those of [`QUICK_CLAIMS`], each of which must have
+/// been tried unless its experiment was not asked for; of others all that were tried.
 fn as_expected(arguments: &PaperArguments, claims: &[Claim]) -> bool {
     if !arguments.quick {
         return claims.iter().all(|claim| claim.holds != Some(false));

@@ -6,11 +6,11 @@ use trueup_align::vanishing::{Triad, TriadOutcome};
 use trueup_core::StageContext;
 use trueup_core::geometry::rows_of;
 
-/// Directions of photographs with each direction found, independently with probability `share` (0 to 1), replaced by one
-/// drawn uniformly from the sphere; the others stay, so that the three of a photograph are no longer orthogonal.
+/// Directions of photographs with each direction found, independently with probability `share` (0 to 1), replaced by
+/// one drawn uniformly from the sphere; the others stay, so that the three of a photograph are no longer orthogonal.
 ///
-/// The draws depend on the seed of `context` and the photograph's position. A larger share replaces the same directions and
-/// more.
+/// The draws depend on the seed of `context` and the photograph's position. A larger share replaces the same directions
+/// and more.
 ///
 /// # Source
 /// The noise of the paper's experiment on its robust scheme; the paper does not say how its noise is drawn.
@@ -58,8 +58,8 @@ mod tests {
         })
     }
 
-    /// Of 3 x 400 directions a share of 0.25 is 300 in the mean with a standard deviation of 15; those replaced stay unit
-    /// vectors, those of a smaller share are among those of a larger one.
+    /// Of 3 x 400 directions a share of 0.25 is 300 in the mean with a standard deviation of 15; those replaced stay
+    /// unit vectors, those of a smaller share are among those of a larger one.
     #[test]
     fn the_share_asked_for_is_replaced() {
         let found = vec![unturned(); 400];

@@ -45,8 +45,8 @@ pub(crate) fn area(curve: &[RocPoint]) -> f64 {
         .sum()
 }
 
-/// The threshold that parts the classes best: it maximizes true rate minus false rate (Youden's J), and lies half way to
-/// the next number above, where it is farthest from either. `None` for an empty curve.
+/// The threshold that parts the classes best: it maximizes true rate minus false rate (Youden's J), and lies half way
+/// to the next number above, where it is farthest from either. `None` for an empty curve.
 pub(crate) fn best_threshold(curve: &[RocPoint]) -> Option<RocPoint> {
     let gain = |point: &RocPoint| point.true_rate - point.false_rate;
     let mut best: Option<usize> = None;

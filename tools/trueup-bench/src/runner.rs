@@ -1,5 +1,5 @@
-//! Runs trials: set by set, sets in parallel, each photograph measured and matched and each panorama aligned as seldom as
-//! possible.
+//! Runs trials: set by set, sets in parallel, each photograph measured and matched and each panorama aligned as seldom
+//! as possible.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -48,8 +48,8 @@ struct SetTrials<'t> {
 impl Runner<'_> {
     /// Runs what is not stored yet and returns all rows in the order of the trials.
     ///
-    /// A trial whose photographs cannot be stitched has a row that says why, marked `refused` if another method could; sets
-    /// that cannot be made or read end the run.
+    /// A trial whose photographs cannot be stitched has a row that says why, marked `refused` if another method could;
+    /// sets that cannot be made or read end the run.
     ///
     /// # Errors
     /// Those of making and reading sets, of options that cannot be, of writing; [`Error::Cancelled`].

@@ -56,8 +56,8 @@ pub(crate) fn share(count: usize, of: usize) -> String {
     format!("{count} of {of}")
 }
 
-/// Spearman's correlation of two lists of the same length: Pearson's of the ranks, ties sharing the mean of theirs. `None`
-/// with fewer than two pairs, or where all values of a list are alike.
+/// Spearman's correlation of two lists of the same length: Pearson's of the ranks, ties sharing the mean of theirs.
+/// `None` with fewer than two pairs, or where all values of a list are alike.
 ///
 /// # Source
 /// Spearman, "The proof and measurement of association between two things", 1904.

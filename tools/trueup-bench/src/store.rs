@@ -25,8 +25,8 @@ struct State {
 }
 
 impl ResultStore {
-    /// Opens the file, which is made if need be, and reads what it holds: results of the build `version` alone. A last line
-    /// that was cut off is dropped.
+    /// Opens the file, which is made if need be, and reads what it holds: results of the build `version` alone. A last
+    /// line that was cut off is dropped.
     ///
     /// # Errors
     /// [`Error::Io`] if the file cannot be read or written; [`Error::Input`] if it holds results of another build.

@@ -27,7 +27,8 @@ pub(crate) struct Trial {
     pub reference: Option<usize>,
     /// Only so many photographs of the set; `None` for all.
     pub photograph_count: Option<usize>,
-    /// Whether these are the ones around the middle of the set, with the middle one for the reference, instead of the first.
+    /// Whether these are the ones around the middle of the set, with the middle one for the reference, instead of the
+    /// first.
     pub central: bool,
     /// Whether the photographs are also compared pixel by pixel.
     pub pixels: bool,

@@ -1,5 +1,6 @@
-//! What trueup reads that somebody else wrote, each as a target that any fuzzer can try: the command `trueup-fuzz`, whose changes
-//! are drawn at random, and libFuzzer, which is guided by the code that an input reaches (the folder `fuzz`).
+//! What trueup reads that somebody else wrote, each as a target that any fuzzer can try: the command `trueup-fuzz`,
+//! whose changes are drawn at random, and libFuzzer, which is guided by the code that an input reaches (the folder
+//! `fuzz`).
 #![forbid(unsafe_code)]
 
 mod png;

@@ -16,8 +16,8 @@ use trueup_fuzz::{TARGETS, Target};
 
 /// Changes valid inputs at random and reads them. What panics is kept as a file and ends the command with status 1.
 ///
-/// Mutations are drawn from a seeded generator: the same seed, target and number of executions try the same inputs. What aborts
-/// the program at once, as a stack that overflows, leaves its input in the work folder.
+/// Mutations are drawn from a seeded generator: the same seed, target and number of executions try the same inputs.
+/// What aborts the program at once, as a stack that overflows, leaves its input in the work folder.
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Arguments {

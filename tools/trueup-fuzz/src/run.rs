@@ -31,8 +31,8 @@ pub(crate) struct Findings {
     pub(crate) slowest: Duration,
 }
 
-/// Panics in all threads of the program, those that were caught within as well: trueup contains what a decoder does, and here it is
-/// a finding still.
+/// Panics in all threads of the program, those that were caught within as well: trueup contains what a decoder does,
+/// and here it is a finding still.
 static PANICS: AtomicU64 = AtomicU64::new(0);
 
 /// Held while a target is tried: whose panic it is, nobody could tell otherwise.

@@ -1,6 +1,8 @@
-//! Something flat, photographed by cameras that move along it: a painted wall, the ground from the air, sheets on a scanner.
+//! Something flat, photographed by cameras that move along it: a painted wall, the ground from the air, sheets on a
+//! scanner.
 //!
-//! The world is the plane z = 0: x to the right on it, y down, z away from the photographer, whose centers are negative there.
+//! The world is the plane z = 0: x to the right on it, y down, z away from the photographer, whose centers are negative
+//! there.
 
 use std::fs;
 use std::path::Path;
@@ -91,8 +93,8 @@ impl FlatSetKind {
     }
 }
 
-/// The cameras of a set of that kind, by a seed, of photographs of that size in pixels: row after row, from left to right, the
-/// middle of all before the origin.
+/// The cameras of a set of that kind, by a seed, of photographs of that size in pixels: row after row, from left to
+/// right, the middle of all before the origin.
 pub fn flat_rig(kind: FlatSetKind, seed: u64, [width, height]: [usize; 2]) -> Vec<PosedCamera> {
     let movement = kind.movement();
     let Movement { rows, columns, distance, .. } = movement;
@@ -244,12 +246,12 @@ pub fn flat_picture(texture: &FlatTexture, posed: &PosedCamera) -> Raster<u8> {
     picture
 }
 
-/// Writes the photographs of a flat set into a folder, which is made if need be: `00.jpg`, `01.jpg`, ..., and last `truth.json`, so that
-/// a folder with it is complete.
+/// Writes the photographs of a flat set into a folder, which is made if need be: `00.jpg`, `01.jpg`, ..., and last
+/// `truth.json`, so that a folder with it is complete.
 ///
 /// # Errors
-/// [`Error::Io`] if a file cannot be written, [`Error::Limits`] for a picture too large for JPEG, [`Error::Cancelled`] between
-/// pictures.
+/// [`Error::Io`] if a file cannot be written, [`Error::Limits`] for a picture too large for JPEG, [`Error::Cancelled`]
+/// between pictures.
 pub fn write_flat_set(
     directory: &Path,
     source: &str,

@@ -2,8 +2,8 @@
 //! panoramas of real places ([`cut`]).
 //!
 //! A [`LitScene`] (a room, a street, or open country) is built from a seed; [`rig`] places the cameras of a hand-held
-//! panorama in it; [`render`] takes the photographs and [`write_set`] stores them with their truth. [`flat_rig`] moves cameras along
-//! something flat.
+//! panorama in it; [`render`] takes the photographs and [`write_set`] stores them with their truth. [`flat_rig`] moves
+//! cameras along something flat.
 //!
 //! ```
 //! use trueup_scenes::{LightQuality, Quality, RigOptions, LitScene, SceneOptions, render, rig};

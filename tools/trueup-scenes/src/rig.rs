@@ -47,8 +47,9 @@ trueup_core::options! {
         translation_fraction: f64 = 0.01, between(0.0, 0.5), "of depth";
         /// Deviation of the exposure.
         exposure_sd: f64 = 0.15, between(0.0, 2.0), "stops";
-        /// How much brighter the half of the world around the viewpoint's own direction is than the other half, as sun is than shade; every
-        /// picture is then exposed for what lies in its middle. 0 for the scene's own light and one exposure.
+        /// How much brighter the half of the world around the viewpoint's own direction is than the other half, as sun
+        /// is than shade; every picture is then exposed for what lies in its middle. 0 for the scene's own light and
+        /// one exposure.
         shade_stops: f64 = 0.0, between(0.0, 16.0), "stops";
         /// Deviation of the red and blue gains.
         white_balance_sd: f64 = 0.015, between(0.0, 0.3), "";
@@ -84,7 +85,8 @@ pub struct PosedCamera {
     pub seed: u64,
 }
 
-/// Light that differs by directions, beside what the scene's own lamps and sun do: the two halves of a turn lie in sun and in shade.
+/// Light that differs by directions, beside what the scene's own lamps and sun do: the two halves of a turn lie in sun
+/// and in shade.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shade {
     /// Yaw of the middle of the sunlit half, radians, positive to the right of the world's z.
@@ -97,7 +99,8 @@ impl Shade {
     /// The same light everywhere.
     pub const NONE: Self = Self { sun_yaw: 0.0, stops: 0.0 };
 
-    /// Gain of the light that comes from `direction` of the world: half of the stops more in the sun, half less in the shade.
+    /// Gain of the light that comes from `direction` of the world: half of the stops more in the sun, half less in the
+    /// shade.
     pub fn gain(&self, direction: &Vector3<f64>) -> f64 {
         /// Half of the angle over which sun goes over into shade, radians: about a third of an ordinary photograph.
         const PENUMBRA: f64 = 0.15;
@@ -222,7 +225,8 @@ mod tests {
 
     use super::*;
 
-    /// Eight stops: sixteen times as much light in the middle of the sun, a sixteenth opposite, the scene's own at the edge; exposures undo it.
+    /// Eight stops: sixteen times as much light in the middle of the sun, a sixteenth opposite, the scene's own at the
+    /// edge; exposures undo it.
     #[test]
     fn sun_and_shade_lie_stops_apart_and_each_picture_is_exposed_for_its_own() {
         let shade = Shade { sun_yaw: 0.5, stops: 8.0 };

@@ -103,8 +103,8 @@ fn float_map(depths: &Raster<f32>) -> Vec<u8> {
     bytes
 }
 
-/// A baseline JPEG at [`JPEG_QUALITY`] with halved chroma, in one scan: the encoder's optimized Huffman tables would come
-/// with a scan for each component, which cameras never write and some decoders misread.
+/// A baseline JPEG at [`JPEG_QUALITY`] with halved chroma, in one scan: the encoder's optimized Huffman tables would
+/// come with a scan for each component, which cameras never write and some decoders misread.
 pub(crate) fn jpeg(picture: &Raster<u8>) -> Result<Vec<u8>> {
     let too_large = || Error::Limits {
         subject: "a JPEG picture".to_owned(),

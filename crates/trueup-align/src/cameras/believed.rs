@@ -1,4 +1,5 @@
-//! Which pairs cameras are found from: all but those that contradict the others, or, where these are many, what the strongest of them confirm.
+//! Which pairs cameras are found from: all but those that contradict the others, or, where these are many, what the
+//! strongest of them confirm.
 
 use trueup_core::Result;
 use trueup_core::camera::Camera;
@@ -9,14 +10,14 @@ use super::observations;
 use super::solution::{Solution, graph_of};
 use super::transfer::CameraTransfer;
 
-/// Share of all agreeing matches in the pairs set aside beyond which it is asked whether the wrong ones are. Of cut sets without false overlaps it is 0.02
-/// at most, of most that false overlaps turn wrong 0.05 and more.
+/// Share of all agreeing matches in the pairs set aside beyond which it is asked whether the wrong ones are. Of cut
+/// sets without false overlaps it is 0.02 at most, of most that false overlaps turn wrong 0.05 and more.
 const MUCH_SET_ASIDE: f64 = 0.02;
-/// The same share beyond which a warning says so, of the pairs that are set aside in the end. Of cut sets whose cameras are right without anything that
-/// repeats it is 0.02 at most.
+/// The same share beyond which a warning says so, of the pairs that are set aside in the end. Of cut sets whose cameras
+/// are right without anything that repeats it is 0.02 at most.
 pub(super) const MUCH_AGAINST: f64 = 0.05;
-/// How many more agreeing matches cameras from the strongest pairs on have to confirm to be believed instead, relative: what parallax sets aside here
-/// or there is no more.
+/// How many more agreeing matches cameras from the strongest pairs on have to confirm to be believed instead, relative:
+/// what parallax sets aside here or there is no more.
 const MORE_CONFIRMED: f64 = 0.02;
 /// Times that pairs are taken back, at most. Mostly the first takes all.
 const MOST_ROUNDS: usize = 3;
@@ -44,9 +45,9 @@ pub(super) struct Belief<'a> {
 impl Belief<'_> {
     /// The cameras that most of what agrees confirms.
     ///
-    /// All pairs together tell which of them contradict the others, the worst first. False ones that are many or large spoil the cameras that they are
-    /// measured against, so that true ones go and they stay. Where much was set aside, the cameras are therefore also found from the strongest pairs alone, and those
-    /// that agree are taken back.
+    /// All pairs together tell which of them contradict the others, the worst first. False ones that are many or large
+    /// spoil the cameras that they are measured against, so that true ones go and they stay. Where much was set aside,
+    /// the cameras are therefore also found from the strongest pairs alone, and those that agree are taken back.
     pub(super) fn best(&self) -> Result<Believed> {
         let all: Vec<usize> = (0..self.pairs.len()).collect();
         let found = self.of_all(&all)?;

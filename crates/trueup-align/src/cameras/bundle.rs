@@ -27,8 +27,8 @@ use super::straightness::{CurveObservations, CurveTerm, curve_cost};
 pub(super) const COARSE_HUBER_PX: f64 = 20.0;
 /// The same in the final pass, working pixels: a few times the error of a match.
 pub(super) const FINE_HUBER_PX: f64 = 2.0;
-/// Smallest limit of the sharp pass, working pixels: features are hardly found more exactly, and below it the loss has corners that
-/// steps stumble over.
+/// Smallest limit of the sharp pass, working pixels: features are hardly found more exactly, and below it the loss has
+/// corners that steps stumble over.
 const LEAST_SHARP_HUBER_PX: f64 = 0.15;
 /// A focal length within this factor of the shortest believed one was stopped there.
 const STOPPED_SHORT: f64 = 1.001;
@@ -123,9 +123,9 @@ impl BundleAdjustment<'_> {
         levenberg_marquardt::minimize(&Pass { problem: self, model, huber_px, pattern }, parameters, settled, context)
     }
 
-    /// Refines settled `parameters` once more, with the limit that suits the matches: their median distance, where most of them are
-    /// that near. Errors of matches have long tails, since features differ in size: where most are off by a quarter of a pixel, those
-    /// that are off by two would count 64 times as much as these.
+    /// Refines settled `parameters` once more, with the limit that suits the matches: their median distance, where most
+    /// of them are that near. Errors of matches have long tails, since features differ in size: where most are off by a
+    /// quarter of a pixel, those that are off by two would count 64 times as much as these.
     ///
     /// # Errors
     /// [`trueup_core::Error::Cancelled`].
@@ -206,8 +206,8 @@ impl BundleAdjustment<'_> {
         (0..self.priors.len()).flat_map(of_photograph).collect()
     }
 
-    /// Columns of what [`Self::terms`] says: the pairs, then, with lenses, the clusters of edges, whose photograph stands for
-    /// the first of a pair.
+    /// Columns of what [`Self::terms`] says: the pairs, then, with lenses, the clusters of edges, whose photograph
+    /// stands for the first of a pair.
     pub(super) fn all_columns<const LOCAL: usize>(&self, model: &IntrinsicsModel) -> Vec<Columns<LOCAL>> {
         let of_pairs = self.observations.pairs.iter().map(|pair| self.columns(pair, model));
         let of_curves = self.curves.clusters.iter().map(|cluster| {
@@ -219,7 +219,8 @@ impl BundleAdjustment<'_> {
         of_pairs.chain(of_curves.filter(|_| LOCAL == LENS_LOCAL)).collect()
     }
 
-    /// The quadratic model of every pair in the unknowns that `model` leaves free, and with lenses of every cluster of edges.
+    /// The quadratic model of every pair in the unknowns that `model` leaves free, and with lenses of every cluster of
+    /// edges.
     fn terms<const LOCAL: usize>(
         &self,
         cameras: &[Camera],

@@ -70,8 +70,8 @@ fn the_gradient_by_every_term_of_a_lens_matches_finite_differences() {
     }
 }
 
-/// Two photographs of focal length 500 that turned by 0.35 about the vertical, behind matches on a grid: `error_px` is how far each is
-/// displaced sideways in b. The adjusted focal length before and after the sharp pass.
+/// Two photographs of focal length 500 that turned by 0.35 about the vertical, behind matches on a grid: `error_px` is
+/// how far each is displaced sideways in b. The adjusted focal length before and after the sharp pass.
 fn sharpened_focal_px(error_px: impl Fn(usize) -> f64) -> [f64; 2] {
     let priors: Vec<CameraPrior> = vec![CameraPrior::unknown(FRAME, 0); 2];
     let turn = exp_rotation(&Vector3::new(0.0, -0.35, 0.0));
@@ -106,8 +106,8 @@ fn sharpened_focal_px(error_px: impl Fn(usize) -> f64) -> [f64; 2] {
     [fine, sharp].map(|parameters| parameters.focal_px[0])
 }
 
-/// Of every ten matches three lie up to 1.9 px aside, the more the farther down the list, the others 0.1 px to and fro: nearly
-/// normal errors with a long tail. The sharp pass is at least twice as near to the true focal length.
+/// Of every ten matches three lie up to 1.9 px aside, the more the farther down the list, the others 0.1 px to and fro:
+/// nearly normal errors with a long tail. The sharp pass is at least twice as near to the true focal length.
 #[test]
 fn long_tails_hardly_move_what_the_sharp_pass_finds() {
     let [fine, sharp] = sharpened_focal_px(|k| match k % 10 {

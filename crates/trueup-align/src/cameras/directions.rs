@@ -1,14 +1,17 @@
 //! What the directions of lines tell of focal lengths.
 //!
-//! Upright and level edges of what is built lie along three directions at right angles. Through the right focal length they do so in all
-//! photographs at once; through another one right angles are none, and directions that photographs share come apart.
+//! Upright and level edges of what is built lie along three directions at right angles. Through the right focal length
+//! they do so in all photographs at once; through another one right angles are none, and directions that photographs
+//! share come apart.
 //!
 //! # Source
-//! Caprile and Torre, "Using vanishing points for camera calibration" (1990): the focal length makes vanishing points those of right angles.
+//! Caprile and Torre, "Using vanishing points for camera calibration" (1990): the focal length makes vanishing points
+//! those of right angles.
 //!
 //! # Departures
-//! No vanishing point is formed. The lines of all photographs are asked together, seen through the cameras that the matches have at each focal
-//! length, how well they fit one frame; how sure that is, the scene tells without one sector of it each.
+//! No vanishing point is formed. The lines of all photographs are asked together, seen through the cameras that the
+//! matches have at each focal length, how well they fit one frame; how sure that is, the scene tells without one sector
+//! of it each.
 
 use std::collections::BTreeSet;
 
@@ -26,8 +29,9 @@ use crate::vanishing::joint::{AxisWeights, LineVote};
 
 /// Fewer sectors with lines tell nothing of how they scatter.
 const FEWEST_SECTORS: usize = 3;
-/// Standard deviation of what all lines of a scene err by alike, relative: what a lens bends, and what is not quite at right angles. Measured: seven pairs of one
-/// telephone scatter by 0.015 about the focal length that its maker states, seven other sets by 0.08.
+/// Standard deviation of what all lines of a scene err by alike, relative: what a lens bends, and what is not quite at
+/// right angles. Measured: seven pairs of one telephone scatter by 0.015 about the focal length that its maker states,
+/// seven other sets by 0.08.
 const SCENE_DEVIATION: f64 = 0.06;
 /// Segments that are asked, shared out evenly among the photographs, the longest first.
 const MAX_SEGMENTS: usize = 600;
@@ -74,7 +78,8 @@ fn rotations_of(cameras: &[Camera]) -> Vec<Matrix3<f64>> {
     cameras.iter().map(Camera::rotation).collect()
 }
 
-/// The best frames through the cameras of each focal length in turn. It turns little from one to the next, so that few are searched from nothing.
+/// The best frames through the cameras of each focal length in turn. It turns little from one to the next, so that few
+/// are searched from nothing.
 fn best_frames(votes: &[LineVote], cameras: &[Vec<Camera>]) -> Option<Vec<BestFrame>> {
     let search = |index: usize| BestFrame::searched(&votes[index], &rotations_of(&cameras[index]));
     let is_searched = |index: usize| index % SEARCHED_EVERY == SEARCHED_EVERY / 2;
@@ -93,10 +98,11 @@ fn best_frames(votes: &[LineVote], cameras: &[Vec<Camera>]) -> Option<Vec<BestFr
 }
 
 impl FocalByLines {
-    /// The focal length through which `lines` fit a frame of right angles best. `cameras` are the same photographs' with ever longer
-    /// focal lengths: by a factor of e^`first`, and then each by one of e^`step`.
+    /// The focal length through which `lines` fit a frame of right angles best. `cameras` are the same photographs'
+    /// with ever longer focal lengths: by a factor of e^`first`, and then each by one of e^`step`.
     ///
-    /// `None` where no frame stands out from chance, where the best is the first or the last, and where lines are in too few sectors of the scene.
+    /// `None` where no frame stands out from chance, where the best is the first or the last, and where lines are in
+    /// too few sectors of the scene.
     pub(super) fn told(
         cameras: &[Vec<Camera>],
         first: f64,
@@ -137,8 +143,8 @@ impl FocalByLines {
     }
 }
 
-/// Where lines fit best without those of one sector each, of those in which some fit at `nearest`; `fits` are of each segment at each focal length. `None` if
-/// that is the first or the last focal length for any.
+/// Where lines fit best without those of one sector each, of those in which some fit at `nearest`; `fits` are of each
+/// segment at each focal length. `None` if that is the first or the last focal length for any.
 fn peaks_without_each(fits: &[Vec<f64>], sectors: &[usize], nearest: usize) -> Option<Vec<f64>> {
     let supporting = sectors.iter().zip(&fits[nearest]).filter(|(_, fit)| **fit > 0.0);
     let populated: BTreeSet<usize> = supporting.map(|(&sector, _)| sector).collect();
@@ -150,7 +156,8 @@ fn peaks_without_each(fits: &[Vec<f64>], sectors: &[usize], nearest: usize) -> O
     populated.into_iter().map(without).collect()
 }
 
-/// Where values at 0, 1, 2, ... are greatest, by the parabola through the greatest one and those beside it; `None` if it is the first or the last.
+/// Where values at 0, 1, 2, ... are greatest, by the parabola through the greatest one and those beside it; `None` if
+/// it is the first or the last.
 pub(super) fn peak(values: &[f64]) -> Option<f64> {
     let greatest = (0..values.len()).reduce(|best, one| if values[one] > values[best] { one } else { best })?;
     let before = values[greatest.checked_sub(1)?];

@@ -5,7 +5,8 @@ use trueup_core::geometry::rows_of;
 
 use super::*;
 
-/// What these cameras show of a scene of straight edges, off by `noise_px`: a lattice of lines at depth 1 before the first.
+/// What these cameras show of a scene of straight edges, off by `noise_px`: a lattice of lines at depth 1 before the
+/// first.
 fn edges(cameras: &[Camera], noise_px: f64) -> Vec<Vec<EdgeCurve>> {
     let mut generator = StageContext::default().generator("edges", 1);
     let mut noise = move || noise_px * ((0..12).map(|_| generator.random::<f64>()).sum::<f64>() - 6.0);

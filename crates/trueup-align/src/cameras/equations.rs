@@ -1,4 +1,5 @@
-//! Normal equations of bundle adjustment, sparse: a photograph's unknowns meet only those of the photographs that overlap it.
+//! Normal equations of bundle adjustment, sparse: a photograph's unknowns meet only those of the photographs that
+//! overlap it.
 
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat};
@@ -102,8 +103,8 @@ impl<const LOCAL: usize> NormalPattern<LOCAL> {
 }
 
 impl NormalEquations {
-    /// The Cholesky factor of N + damping diag N, with 1 on the diagonal for unknowns without any data, which then stay where they
-    /// are; `None` if it is not positive definite.
+    /// The Cholesky factor of N + damping diag N, with 1 on the diagonal for unknowns without any data, which then stay
+    /// where they are; `None` if it is not positive definite.
     pub(super) fn factor(&self, damping: f64) -> Option<Llt<usize, f64>> {
         let mut damped = self.lower.clone();
         for k in 0..damped.ncols() {

@@ -1,16 +1,18 @@
 //! What is expected of focal lengths, where overlaps are not sure of them.
 //!
-//! A rotating camera's focal length is seen in how an overlap is stretched from one photograph to the other. A step aside
-//! stretches it as well, as another focal length would: before a wall that is seen head on, one that is twice as long. What
-//! remains is how badly matches meet, and that grows little over a wide range of focal lengths. So where they do not meet to the error of a feature,
-//! the directions of lines ([`super::directions`]) and metadata, or what is usual, have their say.
+//! A rotating camera's focal length is seen in how an overlap is stretched from one photograph to the other. A step
+//! aside stretches it as well, as another focal length would: before a wall that is seen head on, one that is twice as
+//! long. What remains is how badly matches meet, and that grows little over a wide range of focal lengths. So where
+//! they do not meet to the error of a feature, the directions of lines ([`super::directions`]) and metadata, or what is
+//! usual, have their say.
 //!
 //! So it is where a lens bends: how much it does trades for the focal length, and is refined anew at each.
 //!
 //! # Source
-//! The focal length that is most probable by Bayes' theorem. Errors of unknown size are integrated out (Gelman and others, "Bayesian Data
-//! Analysis", section 3.2): the likelihood of n of them falls as their mean square to the power of n / 2. Witnesses that may be wrong altogether have the
-//! tails of Student's t (the same, chapter 17): where two agree, a third that contradicts both is left.
+//! The focal length that is most probable by Bayes' theorem. Errors of unknown size are integrated out (Gelman and
+//! others, "Bayesian Data Analysis", section 3.2): the likelihood of n of them falls as their mean square to the power
+//! of n / 2. Witnesses that may be wrong altogether have the tails of Student's t (the same, chapter 17): where two
+//! agree, a third that contradicts both is left.
 
 use nalgebra::Matrix3;
 use trueup_core::camera::Camera;
@@ -31,21 +33,26 @@ const FEATURE_ERROR_PX: f64 = 0.5;
 const INDEPENDENT_PARTS: f64 = 4.0;
 /// More overlaps tell focal lengths without help.
 const MOST_OVERLAPS: usize = 30;
-/// Distance from what is expected, in its standard deviations, up to which it is not asked: it would hardly move anything.
+/// Distance from what is expected, in its standard deviations, up to which it is not asked: it would hardly move
+/// anything.
 const AS_EXPECTED: f64 = 0.5;
-/// Step of the search, as the logarithm of a factor. Reasoned: the standard deviation of what is looked for is 0.06 at the least, so that a parabola
-/// through three steps follows its peak; a fourth of it moves what comes out by less than a thousandth.
+/// Step of the search, as the logarithm of a factor. Reasoned: the standard deviation of what is looked for is 0.06 at
+/// the least, so that a parabola through three steps follows its peak; a fourth of it moves what comes out by less than
+/// a thousandth.
 const STEP: f64 = 0.08;
 /// Most steps from what matches say to what is expected; they are longer where it is farther.
 const MOST_STEPS: f64 = 30.0;
-/// Relative decrease of the cost below which the cameras of one step have settled: what that makes improbable falls by so much, a few hundred times.
+/// Relative decrease of the cost below which the cameras of one step have settled: what that makes improbable falls by
+/// so much, a few hundred times.
 const SETTLED: f64 = 1e-4;
 /// How far the search goes beyond what matches say and what is expected, in the same terms, where lines are asked.
 const BEYOND: f64 = 0.4;
-/// Of how many errors' worth what matches, and metadata, say is as a whole: who walks along a facade stretches all overlaps alike, and a picture that was cut out
-/// of another keeps its metadata. Reasoned: with four it has the tails of Student's t with three degrees of freedom, the fewest that have a variance.
+/// Of how many errors' worth what matches, and metadata, say is as a whole: who walks along a facade stretches all
+/// overlaps alike, and a picture that was cut out of another keeps its metadata. Reasoned: with four it has the tails
+/// of Student's t with three degrees of freedom, the fewest that have a variance.
 const ERRORS_OF_WITNESS: f64 = 4.0;
-/// How improbable the focal lengths one step aside are by matches that are so sure of theirs, twice as sure as lines, that these are not asked.
+/// How improbable the focal lengths one step aside are by matches that are so sure of theirs, twice as sure as lines,
+/// that these are not asked.
 const SURE: f64 = 7.0;
 
 /// Cameras with focal lengths in which what is expected of them takes part.
@@ -67,7 +74,8 @@ pub(super) struct OpenFocal {
 struct Candidate {
     log_factor: f64,
     parameters: Parameters,
-    /// Minus twice the logarithm of its probability by matches and edges, but for a constant, were these right about all but chance.
+    /// Minus twice the logarithm of its probability by matches and edges, but for a constant, were these right about
+    /// all but chance.
     improbable: f64,
 }
 
@@ -77,8 +85,8 @@ struct Sides {
     longer: Vec<Candidate>,
 }
 
-/// The cameras of `found`, whose unknowns are those of `model`, with the focal lengths that are most probable; `None` where matches are sure of
-/// theirs, or tell what is expected, and `lines` say nothing else.
+/// The cameras of `found`, whose unknowns are those of `model`, with the focal lengths that are most probable; `None`
+/// where matches are sure of theirs, or tell what is expected, and `lines` say nothing else.
 ///
 /// # Errors
 /// [`trueup_core::Error::Cancelled`].
@@ -191,7 +199,8 @@ impl<'a> FocalSearch<'a> {
         Ok(Candidate { log_factor, parameters, improbable })
     }
 
-    /// Where refinement starts from at a factor of this logarithm: with longer focal lengths than `nearby` photographs are turned less far apart.
+    /// Where refinement starts from at a factor of this logarithm: with longer focal lengths than `nearby` photographs
+    /// are turned less far apart.
     fn stretched(&self, nearby: &Parameters, log_factor: f64) -> Parameters {
         let focal_px: Vec<f64> = self.found.focal_px.iter().map(|focal_px| focal_px * log_factor.exp()).collect();
         let by: Vec<f64> = focal_px.iter().zip(&nearby.focal_px).map(|(to, from)| to / from).collect();
@@ -224,7 +233,8 @@ impl<'a> FocalSearch<'a> {
     }
 }
 
-/// What this many standard deviations squared make improbable of a witness that may be wrong altogether: as a bell does where they are few.
+/// What this many standard deviations squared make improbable of a witness that may be wrong altogether: as a bell does
+/// where they are few.
 fn tailed(square: f64) -> f64 {
     ERRORS_OF_WITNESS * (square / ERRORS_OF_WITNESS).ln_1p()
 }
@@ -253,8 +263,9 @@ struct Expectation {
 }
 
 impl Expectation {
-    /// Of what is known of each photograph: of those that the user told alone where there are any, else of those with metadata. All are longer
-    /// or shorter than expected by one factor: what is best known of some says it of the others.
+    /// Of what is known of each photograph: of those that the user told alone where there are any, else of those with
+    /// metadata. All are longer or shorter than expected by one factor: what is best known of some says it of the
+    /// others.
     fn of(priors: &[CameraPrior], found: &Parameters, options: &CameraOptions) -> Self {
         let told = priors.iter().any(|prior| prior.focal_told);
         let known = priors.iter().any(|prior| prior.focal_px.is_some());

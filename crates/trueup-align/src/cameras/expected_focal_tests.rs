@@ -22,7 +22,8 @@ fn cameras(focal_px: f64) -> [Camera; 2] {
         .map(|yaw| Camera::new(focal_px, FRAME.width, FRAME.height, &rotation_about_y(yaw.to_radians()).transpose()))
 }
 
-/// A wall 4 m away, whose parts stand out by up to 0.2 m, in two photographs; the second from so many meters to the right.
+/// A wall 4 m away, whose parts stand out by up to 0.2 m, in two photographs; the second from so many meters to the
+/// right.
 fn pair(focal_px: f64, step_m: f64) -> PairMatches {
     let cameras = cameras(focal_px);
     let mut inliers = Vec::new();
@@ -87,7 +88,8 @@ fn edges(focal_px: f64, step_m: f64) -> Vec<Vec<LineSegment>> {
     cameras(focal_px).into_iter().zip(steps).map(of_photograph).collect()
 }
 
-/// Of a lens twice as long as is usual, the step aside, which tells nothing, leaves the usual one; edges at right angles do not.
+/// Of a lens twice as long as is usual, the step aside, which tells nothing, leaves the usual one; edges at right
+/// angles do not.
 #[test]
 fn lines_tell_a_focal_length_that_a_step_aside_leaves_open() {
     let focal_px = 1300.0;
@@ -132,8 +134,8 @@ fn a_step_aside_leaves_a_usual_focal_length_where_none_is_recorded() {
     assert!((expected.parameters.focal_px[0] / by_matches.focal_px[0] / expected.opened.factor - 1.0).abs() < 1e-12);
 }
 
-/// By hand: twice as long as expected is ln 2 = 0.693; with a deviation of 0.4, (0.693 / 0.4)^2 = 3.003, and half as long again
-/// nothing.
+/// By hand: twice as long as expected is ln 2 = 0.693; with a deviation of 0.4, (0.693 / 0.4)^2 = 3.003, and half as
+/// long again nothing.
 #[test]
 fn what_is_expected_falls_off_as_a_bell() {
     let expectation = Expectation { off: 2.0_f64.ln(), sd: 0.4, is_recorded: false };
@@ -141,7 +143,8 @@ fn what_is_expected_falls_off_as_a_bell() {
     assert!(expectation.improbable(0.5_f64.ln()).abs() < 1e-12);
 }
 
-/// By hand: a witness of four errors' worth, (0.693 / 0.1)^2 = 48.05 off, makes 4 ln(1 + 48.05 / 4) = 10.26 improbable; one that is off by little, its square.
+/// By hand: a witness of four errors' worth, (0.693 / 0.1)^2 = 48.05 off, makes 4 ln(1 + 48.05 / 4) = 10.26 improbable;
+/// one that is off by little, its square.
 #[test]
 fn what_metadata_say_may_be_wrong_altogether() {
     let expectation = Expectation { off: 2.0_f64.ln(), sd: 0.1, is_recorded: true };
@@ -149,7 +152,8 @@ fn what_metadata_say_may_be_wrong_altogether() {
     assert!((tailed(1e-3) - 1e-3).abs() < 1e-6 && tailed(0.0) == 0.0);
 }
 
-/// Photographs from one place whose features are a little worse than most: the recorded focal length, 40 % too long, is not even asked.
+/// Photographs from one place whose features are a little worse than most: the recorded focal length, 40 % too long, is
+/// not even asked.
 #[test]
 fn sure_matches_are_left_alone() {
     let truth = row(ROLLS)[..4].to_vec();
@@ -178,8 +182,8 @@ fn sure_matches_are_left_alone() {
     assert!(asked.is_none());
 }
 
-/// Three photographs through a lens that bends, twice as far off as features: 8 % aside of the focal length, another lens makes their matches meet
-/// better than the same one.
+/// Three photographs through a lens that bends, twice as far off as features: 8 % aside of the focal length, another
+/// lens makes their matches meet better than the same one.
 #[test]
 fn lenses_are_refined_anew_at_each_focal_length() {
     let truth = bent(row(ROLLS)[..3].to_vec(), [-0.08, 0.0, 0.0, 0.0], [0.0; 2]);
@@ -214,7 +218,8 @@ fn lenses_are_refined_anew_at_each_focal_length() {
     assert!(anew < 0.9 * held && k1 != same, "{anew} {held} {k1}");
 }
 
-/// Told 660 px where matches say 1320, beside one with 1320 recorded and one of which nothing is known: what is told alone is asked, to 2 %.
+/// Told 660 px where matches say 1320, beside one with 1320 recorded and one of which nothing is known: what is told
+/// alone is asked, to 2 %.
 #[test]
 fn what_is_told_of_one_photograph_is_expected_of_all() {
     let unknown = CameraPrior::unknown(FRAME, 0);

@@ -9,8 +9,8 @@ use super::expected_focal::OpenFocal;
 use super::prior::CameraPrior;
 use super::solution::Solution;
 
-/// Doubt about the corners of photographs, working pixels, one standard deviation, that is worth a word: a lens that moves them by
-/// five times as much, a hundredth of a photograph, would not be noticed.
+/// Doubt about the corners of photographs, working pixels, one standard deviation, that is worth a word: a lens that
+/// moves them by five times as much, a hundredth of a photograph, would not be noticed.
 const DOUBTFUL_LENS_PX: f64 = 2.0;
 
 /// Change of a focal length, relative, that is worth a word.

@@ -1,8 +1,10 @@
-//! Whether the photographs show something flat from places of their own: a scanned map, a mural, the ground from the air.
+//! Whether the photographs show something flat from places of their own: a scanned map, a mural, the ground from the
+//! air.
 //!
-//! What rotating cameras explain, cameras before a plane explain as well: all from one place, with any plane. A flat scene is
-//! therefore told by what rotating cameras do not explain, or explain by a lens that nobody has: moving cameras look to them like
-//! rotating ones through an ever longer lens, since far things move across a picture without being seen from aside.
+//! What rotating cameras explain, cameras before a plane explain as well: all from one place, with any plane. A flat
+//! scene is therefore told by what rotating cameras do not explain, or explain by a lens that nobody has: moving
+//! cameras look to them like rotating ones through an ever longer lens, since far things move across a picture without
+//! being seen from aside.
 
 use std::collections::BTreeMap;
 
@@ -28,27 +30,29 @@ use super::upright_plane::turn_by_lines;
 const WRONG_PX: f64 = 10.0;
 /// Distance up to which a match is explained, working pixels: a few times the error of a match.
 const EXPLAINED_PX: f64 = 3.0;
-/// Share of all matches that a plane explains where the scene is flat. What stands before a facade or lies on the ground takes a
-/// few percent in every photograph.
+/// Share of all matches that a plane explains where the scene is flat. What stands before a facade or lies on the
+/// ground takes a few percent in every photograph.
 const LEAST_EXPLAINED: f64 = 0.95;
 /// The same of every single photograph.
 const LEAST_EXPLAINED_OF_EACH: f64 = 0.85;
-/// Share of all matches that homographies of each pair alone explain where a plane may explain [`LEAST_EXPLAINED`]: what a plane carries from one
-/// photograph into another is a homography but for their lenses, which may bend a tenth of the matches away.
+/// Share of all matches that homographies of each pair alone explain where a plane may explain [`LEAST_EXPLAINED`]:
+/// what a plane carries from one photograph into another is a homography but for their lenses, which may bend a tenth
+/// of the matches away.
 const LEAST_EXPLAINED_PAIR_BY_PAIR: f64 = 0.85;
 /// Times that rotating cameras' residual is that of the plane where it is clearly better.
 const CLEARLY_BETTER: f64 = 2.0;
 /// Root mean square residual of rotating cameras, in working pixels, that is more than noise.
 const MORE_THAN_NOISE_PX: f64 = 1.5;
-/// Fewer photographs do not tell a flat scene from a facade seen by a photographer who went a step aside, unless as scans.
+/// Fewer photographs do not tell a flat scene from a facade seen by a photographer who went a step aside, unless as
+/// scans.
 const FEWEST: usize = 3;
-/// Focal length, in longer sides of the photograph, beyond which rotating cameras are not believed unless they record it: a
-/// field of view of 7 degrees. Rows through such a lens are as flat as scans.
+/// Focal length, in longer sides of the photograph, beyond which rotating cameras are not believed unless they record
+/// it: a field of view of 7 degrees. Rows through such a lens are as flat as scans.
 const LONGEST_BELIEVED: f64 = 8.0;
 /// The same where a scanner would have taken the photographs as well: 19 degrees.
 const LONGEST_BESIDE_SCANS: f64 = 3.0;
-/// Times that the residual of scans may be that of rotating or tilted cameras, which have more to fit with: paper curls, and lenses
-/// and tilts imitate that.
+/// Times that the residual of scans may be that of rotating or tilted cameras, which have more to fit with: paper
+/// curls, and lenses and tilts imitate that.
 const AS_GOOD: f64 = 1.5;
 /// Share of all matches that scans explain: less than any other plane, for the curl of the paper.
 const LEAST_EXPLAINED_OF_SCANS: f64 = 0.75;
@@ -56,7 +60,8 @@ const LEAST_EXPLAINED_OF_SCANS: f64 = 0.75;
 const ONE_SCALE: f64 = 0.02;
 /// Focal lengths that refinement starts from where none is known, in longer sides: telephones, and what was enlarged.
 const START_FOCALS: [f64; 2] = [0.9, 2.5];
-/// A lens is kept where it lowers the sum of squares by so many times the matches' own mean square: five standard deviations.
+/// A lens is kept where it lowers the sum of squares by so many times the matches' own mean square: five standard
+/// deviations.
 const LENS_SIGNIFICANCE: f64 = 25.0;
 /// Fewer pairs do not tell of a lens.
 const FEWEST_PAIRS_FOR_LENS: usize = 3;
@@ -70,15 +75,15 @@ pub struct FlatScene {
     pub cameras: Vec<PlaneCamera>,
     /// Why the scene is taken for flat.
     pub evidence: FlatEvidence,
-    /// Clockwise turn, radians, that lines on the plane ask for beyond what the photographs' own up and down say; `None` where they
-    /// do not agree.
+    /// Clockwise turn, radians, that lines on the plane ask for beyond what the photographs' own up and down say;
+    /// `None` where they do not agree.
     #[serde(default)]
     pub turned_by_lines: Option<f64>,
 }
 
 impl FlatScene {
-    /// The scene turned clockwise so that its lines lie along rows and columns, where they agree on how, and by `turn`, radians,
-    /// beyond that. `lines` has the segments of every photograph.
+    /// The scene turned clockwise so that its lines lie along rows and columns, where they agree on how, and by `turn`,
+    /// radians, beyond that. `lines` has the segments of every photograph.
     #[must_use]
     pub fn stood_upright(&self, lines: &[Vec<LineSegment>], turn: f64) -> Self {
         let turned_by_lines = turn_by_lines(&self.cameras, lines);
@@ -105,8 +110,8 @@ pub struct FlatEvidence {
     pub rotating_rms_px: f64,
     /// Focal length that rotating cameras would need, in longer sides of the photographs: the median.
     pub rotating_focal: f64,
-    /// Whether all cameras look at the plane straight on and at one scale, as a scanner does: their focal length cannot be told, and
-    /// does not matter.
+    /// Whether all cameras look at the plane straight on and at one scale, as a scanner does: their focal length cannot
+    /// be told, and does not matter.
     pub straight_on: bool,
 }
 
@@ -139,8 +144,8 @@ pub(super) fn find(
     let rotating_focal = median_of(input.priors.iter().zip(input.rotating).map(relative)).unwrap_or_default();
     let is_longer_than =
         |limit: f64| rotating_focal > limit && input.priors.iter().all(|prior| prior.focal_px.is_none());
-    // The search takes longer than the rotating cameras: where nothing recorded holds their focal length, moving ones would have drawn it
-    // out.
+    // The search takes longer than the rotating cameras: where nothing recorded holds their focal length, moving ones
+    // would have drawn it out.
     let is_recorded = input.priors.iter().any(|prior| prior.focal_px.is_some());
     let is_bad = input.priors.len() >= FEWEST
         && rotating.rms_px > MORE_THAN_NOISE_PX
@@ -197,7 +202,8 @@ pub(super) fn find(
     Ok(is_flat.then(|| FlatScene { cameras, evidence: evidence(&plane, false), turned_by_lines: None }))
 }
 
-/// How far matches land from where a homography of each pair alone puts them: as near as any plane can bring them, but for a lens.
+/// How far matches land from where a homography of each pair alone puts them: as near as any plane can bring them, but
+/// for a lens.
 fn by_homographies(input: &FlatInput<'_>) -> Residuals {
     let of_pair = |pair: &PairMatches| {
         let points = |point: fn(&PointMatch) -> [f64; 2]| -> Vec<Vector2<f64>> {
@@ -213,7 +219,8 @@ fn by_homographies(input: &FlatInput<'_>) -> Residuals {
 /// Whether there is no direction within 90 degrees of which all cameras look, or hardly one.
 ///
 /// # Source
-/// Rosenblatt's perceptron (1958): a direction that all are within 90 degrees of, with a margin m in the cosine, is found in 1 / m^2 corrections.
+/// Rosenblatt's perceptron (1958): a direction that all are within 90 degrees of, with a margin m in the cosine, is
+/// found in 1 / m^2 corrections.
 fn look_all_round(cameras: &[Camera]) -> bool {
     const CORRECTIONS: usize = 200;
     let forward: Vec<Vector3<f64>> = cameras.iter().map(Camera::forward).collect();

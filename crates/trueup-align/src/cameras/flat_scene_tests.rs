@@ -29,7 +29,8 @@ fn mural() -> Vec<PlaneCamera> {
     (0..5).map(|k| before(tilts[k], [390.0 * k as f64, 30.0 * (k % 2) as f64], distances[k])).collect()
 }
 
-/// Matches between all photographs that overlap, with noise of half a pixel, by where `transfer` has a pixel of one in another.
+/// Matches between all photographs that overlap, with noise of half a pixel, by where `transfer` has a pixel of one in
+/// another.
 fn matched(count: usize, transfer: impl Fn(usize, usize, Vector2<f64>) -> Option<Vector2<f64>>) -> Vec<PairMatches> {
     let context = StageContext::default();
     let mut pairs = Vec::new();
@@ -71,8 +72,8 @@ fn found(pairs: &[PairMatches], count: usize, focal_px: Option<f64>, scene: Scen
     .expect("solvable")
 }
 
-/// Largest distance, in units of the true plane, of the found plane from a scaled, turned and moved copy of the true one, over
-/// the corners of all photographs.
+/// Largest distance, in units of the true plane, of the found plane from a scaled, turned and moved copy of the true
+/// one, over the corners of all photographs.
 fn farthest_from_a_similarity(truth: &[PlaneCamera], found: &[PlaneCamera]) -> f64 {
     let corners = [[0.0, 0.0], [WIDTH, 0.0], [0.0, HEIGHT], [WIDTH, HEIGHT]].map(Vector2::from);
     let places = |cameras: &[PlaneCamera]| -> Vec<Vector2<f64>> {
@@ -172,7 +173,8 @@ fn a_wall_with_things_before_it_is_no_flat_scene() {
     assert_eq!(found(&flat, 5, None, SceneModel::Rotating).flat_scene, None, "as the user says");
 }
 
-/// A row of 5 x 30 degrees lies within a hemisphere, and so do two that look nearly apart; eight of 45 degrees go round, and three of 120.
+/// A row of 5 x 30 degrees lies within a hemisphere, and so do two that look nearly apart; eight of 45 degrees go
+/// round, and three of 120.
 #[test]
 fn cameras_look_all_round_where_no_hemisphere_holds_them() {
     let along = |degrees: &[f64]| -> Vec<Camera> {

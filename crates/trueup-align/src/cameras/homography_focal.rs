@@ -30,7 +30,8 @@ impl Quotient {
     }
 }
 
-/// Focal lengths of the rotating cameras behind a homography from the first of two photographs to the second, if both are real.
+/// Focal lengths of the rotating cameras behind a homography from the first of two photographs to the second, if both
+/// are real.
 ///
 /// Of the two values that the rows (source) and the columns (target) of the homography give, the one with the larger
 /// denominator is taken.

@@ -15,8 +15,8 @@ pub(super) const RADIAL: usize = 3;
 /// First of the two tangential terms.
 pub(super) const TANGENTIAL: usize = 7;
 
-/// Relative spread of separately estimated focal lengths above which `cameras.focal_sharing=auto` lets every photograph have its own; and how far one differs from the
-/// others that may have been zoomed.
+/// Relative spread of separately estimated focal lengths above which `cameras.focal_sharing=auto` lets every photograph
+/// have its own; and how far one differs from the others that may have been zoomed.
 pub(super) const ZOOM_SPREAD: f64 = 0.03;
 
 /// Standard deviation of a radial term before anything is seen: an action camera's reaches 0.3.
@@ -29,7 +29,8 @@ const CENTER_SD: f64 = 0.01;
 /// Where refinement starts from.
 pub(super) struct InitialIntrinsics {
     pub focal_px: Vec<f64>,
-    /// One of every photograph: as told; else pinholes, unless they explain the matches badly and another lens much better.
+    /// One of every photograph: as told; else pinholes, unless they explain the matches badly and another lens much
+    /// better.
     pub lenses: Vec<LensState>,
 }
 
@@ -201,7 +202,8 @@ pub(super) fn set_free(free: &mut [FreeTerms], terms: &[usize], told: &[bool]) {
 mod tests {
     use super::*;
 
-    /// Two groups, the first with a focal length and k1, the second with a focal length, k1 and k2: what is left is counted 0, 1, 2.
+    /// Two groups, the first with a focal length and k1, the second with a focal length, k1 and k2: what is left is
+    /// counted 0, 1, 2.
     #[test]
     fn focal_lengths_are_held_and_the_others_counted_anew() {
         let of = |terms: &[usize]| -> FreeTerms { std::array::from_fn(|term| terms.contains(&term)) };
@@ -215,7 +217,8 @@ mod tests {
         let own = IntrinsicsModel::grouped(&[0, 1, 0], &free).with_own_focal();
         assert_eq!((own.parameters, [0, 1, 2].map(|k| own.parameters_of[k][FOCAL])), (6, [Some(3), Some(4), Some(5)]));
         assert_eq!([0, 1, 2].map(|k| own.parameters_of[k][RADIAL]), [Some(0), Some(1), Some(0)]);
-        // k2 of the first group and the last, each for itself; what is free already is not asked for, nor of whom nothing is.
+        // k2 of the first group and the last, each for itself; what is free already is not asked for, nor of whom
+        // nothing is.
         let wider = own.with_terms(&[RADIAL, RADIAL + 1], &[true, true, false], &[7, 3, 7]);
         let k2_of = |k: usize| wider.parameters_of[k][RADIAL + 1];
         assert_eq!((wider.parameters, [0, 1, 2].map(k2_of)), (7, [Some(6), Some(2), None]));

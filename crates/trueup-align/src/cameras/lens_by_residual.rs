@@ -1,7 +1,9 @@
 //! Lenses of few overlaps, and an automatic focus, told by what they leave: nothing but noise.
 //!
-//! Noise differs from match to match. Photographs from one place, through the right lens, leave nothing that neighboring matches err by alike. Parallax moves alike what is near together, and hardly ever
-//! as a lens does, so that some of that stays whichever lens is tried. Where this tells, the spread of the overlaps need not ([`super::lens_evidence`]), of which one or two have none.
+//! Noise differs from match to match. Photographs from one place, through the right lens, leave nothing that
+//! neighboring matches err by alike. Parallax moves alike what is near together, and hardly ever as a lens does, so
+//! that some of that stays whichever lens is tried. Where this tells, the spread of the overlaps need not
+//! ([`super::lens_evidence`]), of which one or two have none.
 
 use nalgebra::{Matrix2, Vector2};
 use trueup_core::Result;
@@ -19,19 +21,25 @@ use super::transfer::CameraTransfer;
 use super::zoom;
 use crate::evidence::{CommonSquare, OverlapGap};
 
-/// The terms that are asked for together, the fewest first. A lens that is off center leaves as much as one that bends in wide photographs, and of both neither alone explains anything.
+/// The terms that are asked for together, the fewest first. A lens that is off center leaves as much as one that bends
+/// in wide photographs, and of both neither alone explains anything.
 const TOGETHER: [&[usize]; 4] =
     [&[RADIAL], &[RADIAL, RADIAL + 1], &[RADIAL, CENTER, CENTER + 1], &[RADIAL, RADIAL + 1, CENTER, CENTER + 1]];
 /// Most overlaps that are asked so. The spread of seven and more tells as well, in less time.
 const FEW_OVERLAPS: usize = 6;
-/// Share of the square of what neighboring matches err by alike that terms may leave to be believed for it. Measured on pairs and triples: less of two thirds of 83 cut through lenses (of most others the lens
-/// moves matches by hardly more than their noise) and of five photographed ones, whose lenses are those of the whole of their sets; 0.088 and more of some 160 photographed ones with parallax, above 1 of pinholes.
+/// Share of the square of what neighboring matches err by alike that terms may leave to be believed for it. Measured on
+/// pairs and triples: less of two thirds of 83 cut through lenses (of most others the lens moves matches by hardly more
+/// than their noise) and of five photographed ones, whose lenses are those of the whole of their sets; 0.088 and more
+/// of some 160 photographed ones with parallax, above 1 of pinholes.
 const MOST_LEFT: f64 = 1.0 / 16.0;
-/// The same of terms beside those of a lens that is believed already: surely less than is left without them. Chosen on 66 pairs, triples and fours cut through lenses, of which none meets worse for it with shares from 0.25 to 0.9;
-/// parts of photographed sets agree in the centers that they are so told.
+/// The same of terms beside those of a lens that is believed already: surely less than is left without them. Chosen on
+/// 66 pairs, triples and fours cut through lenses, of which none meets worse for it with shares from 0.25 to 0.9; parts
+/// of photographed sets agree in the centers that they are so told.
 const MOST_LEFT_BESIDE: f64 = 0.8;
-/// Standard deviations from the middle of the photograph beyond which a principal point is none, but what parallax makes of one. Of 235 pairs and triples of photographed sets ten are told one within, and focal lengths that
-/// are then off by 2.0 percent in the mean against those of the whole of their sets (7.6 without). Beyond lie four, at 3.7 to 23 percent of the diagonal.
+/// Standard deviations from the middle of the photograph beyond which a principal point is none, but what parallax
+/// makes of one. Of 235 pairs and triples of photographed sets ten are told one within, and focal lengths that are then
+/// off by 2.0 percent in the mean against those of the whole of their sets (7.6 without). Beyond lie four, at 3.7 to 23
+/// percent of the diagonal.
 const MOST_OFF_CENTER: f64 = 2.5;
 /// [`MOST_LEFT`] of a first look at some of the matches, whose noise blurs it.
 const PROMISING: f64 = 0.25;
@@ -39,18 +47,23 @@ const PROMISING: f64 = 0.25;
 const NEARLY_SETTLED: f64 = 1e-4;
 /// The same for a first look from cameras that have settled already: what explains anything does so in few steps.
 const HARDLY_SETTLED: f64 = 1e-2;
-/// A match that is farther off than so many times the median counts as if it were so far off: false ones have large errors, which nothing explains.
+/// A match that is farther off than so many times the median counts as if it were so far off: false ones have large
+/// errors, which nothing explains.
 const FARTHEST_IN_MEDIANS: f64 = 4.0;
 
-/// Square of what neighboring matches err by alike, per axis, working pixels, from which on focal lengths of their own are asked for: ideal cameras leave less.
+/// Square of what neighboring matches err by alike, per axis, working pixels, from which on focal lengths of their own
+/// are asked for: ideal cameras leave less.
 const LEAST_COMMON: f64 = 0.1 * 0.1;
-/// Share of that square that focal lengths of their own, and a lens beside them, may leave to be believed. Of 30 sets cut through lenses with focal lengths that differ by 0.7 percent they leave 0.034 at most, of 29 less than this; of 280
-/// photographed sets, pairs and triples 0.051 at least, but of six parts of one (UW-rainier), which agree in the lens, and in focal lengths that grow from one end to the other.
+/// Share of that square that focal lengths of their own, and a lens beside them, may leave to be believed. Of 30 sets
+/// cut through lenses with focal lengths that differ by 0.7 percent they leave 0.034 at most, of 29 less than this; of
+/// 280 photographed sets, pairs and triples 0.051 at least, but of six parts of one (UW-rainier), which agree in the
+/// lens, and in focal lengths that grow from one end to the other.
 const MOST_LEFT_BY_FOCUS: f64 = 1.0 / 32.0;
 
 impl LensSearch<'_> {
-    /// Whether terms of all groups `of` that are asked, the first of [`TOGETHER`] that do, leave next to nothing that neighboring matches err by alike: then `parameters` are refined
-    /// with them, and `free` has them. Never of many overlaps.
+    /// Whether terms of all groups `of` that are asked, the first of [`TOGETHER`] that do, leave next to nothing that
+    /// neighboring matches err by alike: then `parameters` are refined with them, and `free` has them. Never of many
+    /// overlaps.
     pub(super) fn is_explained_together(
         &self,
         of: &[bool],
@@ -107,9 +120,10 @@ impl LensSearch<'_> {
         Ok(true)
     }
 
-    /// The cameras with a focal length for each photograph, and their model, where these leave next to nothing of what neighboring matches err by alike with `shared` ones: an
-    /// automatic focus changes them by up to a percent or two from photograph to photograph. What differs by more was zoomed ([`zoom::found`]). A lens and a focus hide each other, so
-    /// that terms of [`TOGETHER`] are asked for beside, the fewest that do.
+    /// The cameras with a focal length for each photograph, and their model, where these leave next to nothing of what
+    /// neighboring matches err by alike with `shared` ones: an automatic focus changes them by up to a percent or two
+    /// from photograph to photograph. What differs by more was zoomed ([`zoom::found`]). A lens and a focus hide each
+    /// other, so that terms of [`TOGETHER`] are asked for beside, the fewest that do.
     pub(super) fn refocused(
         &self,
         model: &IntrinsicsModel,
@@ -152,7 +166,8 @@ impl LensSearch<'_> {
         self.problem.observations.pairs.len() > FEW_OVERLAPS
     }
 
-    /// The cameras refined by these matches from `start` on with the second model, and what they leave of what `parameters` refined with the first leave.
+    /// The cameras refined by these matches from `start` on with the second model, and what they leave of what
+    /// `parameters` refined with the first leave.
     fn looked(
         &self,
         matches: Matches,
@@ -198,8 +213,8 @@ struct Looked {
     share: f64,
 }
 
-/// Of what neighboring matches err by alike with the cameras `before`, the share (of its square) that is hardly exceeded with those `after`. Infinite where nothing was in
-/// common before.
+/// Of what neighboring matches err by alike with the cameras `before`, the share (of its square) that is hardly
+/// exceeded with those `after`. Infinite where nothing was in common before.
 pub(super) fn share_left(problem: &BundleAdjustment<'_>, before: &Parameters, after: &Parameters) -> f64 {
     let (before, after) = (gaps(problem, before), gaps(problem, after));
     let mut distances: Vec<f64> = after.iter().flatten().map(|one| one.gap.norm()).collect();
@@ -246,7 +261,8 @@ mod tests {
     use super::super::tests::{ROLLS, bent, frame, matched, row};
     use super::*;
 
-    /// With the true cameras the noise of some 230 matches is left; seen from them, cameras without their lens have everything in common.
+    /// With the true cameras the noise of some 230 matches is left; seen from them, cameras without their lens have
+    /// everything in common.
     #[test]
     fn the_right_cameras_leave_nothing_in_common() {
         let radial = [-0.04, 0.0, 0.0, 0.0];

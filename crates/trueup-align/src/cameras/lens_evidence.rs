@@ -1,9 +1,9 @@
 //! How sure the matches are of intrinsic unknowns.
 //!
 //! # Source
-//! The cluster-robust (sandwich) covariance of an estimating equation (Liang and Zeger, "Longitudinal data analysis using
-//! generalized linear models", 1986): a pair of photographs is a cluster, whose matches err together where there is parallax,
-//! and so are the edges in one part of a photograph, which are bent together where they are of one thing.
+//! The cluster-robust (sandwich) covariance of an estimating equation (Liang and Zeger, "Longitudinal data analysis
+//! using generalized linear models", 1986): a pair of photographs is a cluster, whose matches err together where there
+//! is parallax, and so are the edges in one part of a photograph, which are bent together where they are of one thing.
 
 use faer::linalg::solvers::Solve;
 use nalgebra::{DMatrix, DVector, SVector};
@@ -12,7 +12,8 @@ use super::bundle::{BundleAdjustment, Parameters};
 use super::intrinsics::{FOCAL, IntrinsicsModel, LensState};
 use super::pair_cost::{LENS_LOCAL, PairTerm};
 
-/// Who is asked. The two are asked apart: parallax bends what matches say, and what is round in the scene what edges say.
+/// Who is asked. The two are asked apart: parallax bends what matches say, and what is round in the scene what edges
+/// say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Witness {
     /// The matches of the pairs.
@@ -104,8 +105,8 @@ impl LensEvidence {
         (self.clusters[parameter] > FEWEST_CLUSTERS && deviation > 0.0).then_some(deviation)
     }
 
-    /// How far `parameters` together are from 0: their squared distance in standard deviations, by dimension, after Hotelling's
-    /// correction for few clusters; 0 where there are too few to tell.
+    /// How far `parameters` together are from 0: their squared distance in standard deviations, by dimension, after
+    /// Hotelling's correction for few clusters; 0 where there are too few to tell.
     pub(super) fn significance(&self, parameters: &[usize]) -> f64 {
         let dimension = parameters.len();
         let clusters = parameters.iter().map(|&parameter| self.clusters[parameter]).min().unwrap_or(0);

@@ -10,15 +10,15 @@ use super::lens_evidence::{LensEvidence, Witness};
 use super::options::LensKind;
 use super::prior::CameraPrior;
 
-/// Squared distance from 0, in standard deviations and by dimension, at which matches are believed: 4 standard deviations, since
-/// the deviations rest on a dozen pairs.
+/// Squared distance from 0, in standard deviations and by dimension, at which matches are believed: 4 standard
+/// deviations, since the deviations rest on a dozen pairs.
 const SIGNIFICANT_BY_MATCHES: f64 = 16.0;
 /// The same of edges: 5 standard deviations, since what is round in the scene may be so in all photographs alike.
 const SIGNIFICANT_BY_EDGES: f64 = 25.0;
 /// Shift of a photograph's corners, working pixels, below which k1 is not worth a lens: the error of a match.
 const LEAST_SHIFT_PX: f64 = 0.5;
-/// How much more matches, or edges, may cost with lenses than with pinholes: what is told by the ones and denied by the others is
-/// no lens.
+/// How much more matches, or edges, may cost with lenses than with pinholes: what is told by the ones and denied by the
+/// others is no lens.
 const DENIED: f64 = 1.02;
 /// The terms in the order in which they are asked for; what hides beside a principal point off center once more.
 const BLOCKS: [&[usize]; 6] =
@@ -52,8 +52,8 @@ impl Witness {
 }
 
 impl LensSearch<'_> {
-    /// The cameras refined with lenses, one for every group of photographs with evidence of one; `None` if there is no such
-    /// group, or the lenses lead nowhere. A group shares one focal length.
+    /// The cameras refined with lenses, one for every group of photographs with evidence of one; `None` if there is no
+    /// such group, or the lenses lead nowhere. A group shares one focal length.
     pub(super) fn find(&self, start: &Parameters, group_of: &[usize]) -> Result<Option<FoundLenses>> {
         let groups = group_of.iter().max().map_or(0, |last| last + 1);
         let mut free: Vec<FreeTerms> = vec![only_focal(); groups];
@@ -110,8 +110,9 @@ impl LensSearch<'_> {
         Ok(self.problem.is_sound(&parameters).then_some(FoundLenses { parameters, model }))
     }
 
-    /// Frees k1 of groups among those `asked` that one lens with a `bent` one took, at another of its settings; whether there are any. A
-    /// lens that bends at one focal length bends at all of them, by another amount: that is estimated, and needs no evidence of its own.
+    /// Frees k1 of groups among those `asked` that one lens with a `bent` one took, at another of its settings; whether
+    /// there are any. A lens that bends at one focal length bends at all of them, by another amount: that is estimated,
+    /// and needs no evidence of its own.
     fn add_settings(&self, group_of: &[usize], asked: &[bool], bent: &[bool], free: &mut [FreeTerms]) -> bool {
         let lens_of = CameraPrior::lens_groups(self.problem.priors);
         let bending: Vec<usize> =
@@ -126,8 +127,8 @@ impl LensSearch<'_> {
         added
     }
 
-    /// Which of the groups in `asked` have a lens that bends: those with evidence of k1, which is still there when k1 is found.
-    /// `parameters` are refined with it, `free` has it.
+    /// Which of the groups in `asked` have a lens that bends: those with evidence of k1, which is still there when k1
+    /// is found. `parameters` are refined with it, `free` has it.
     fn bent(
         &self,
         parameters: &mut Parameters,
@@ -174,8 +175,8 @@ impl LensSearch<'_> {
         Ok(bent)
     }
 
-    /// Which of the groups in `asked` have a lens that is off center, whatever it bends beside: those of which matches tell so. `parameters` are refined
-    /// with it, `free` has it.
+    /// Which of the groups in `asked` have a lens that is off center, whatever it bends beside: those of which matches
+    /// tell so. `parameters` are refined with it, `free` has it.
     fn off_center(
         &self,
         parameters: &mut Parameters,
@@ -207,8 +208,8 @@ impl LensSearch<'_> {
         Ok(told)
     }
 
-    /// Whether k1 and the principal point, as they are in `parameters`, are worth a lens: of a pinhole the first look may show a bend that is gone when
-    /// the cameras have settled.
+    /// Whether k1 and the principal point, as they are in `parameters`, are worth a lens: of a pinhole the first look
+    /// may show a bend that is gone when the cameras have settled.
     pub(super) fn is_visible(&self, parameters: &Parameters, group_of: &[usize], group: usize) -> bool {
         group_of.iter().position(|&of| of == group).is_some_and(|member| {
             let lens = &parameters.lenses[member];
@@ -253,8 +254,9 @@ impl LensSearch<'_> {
         Told { by_matches, by_edges }
     }
 
-    /// How far lenses may move the corners of photographs that are taken for those of pinholes, working pixels, one standard
-    /// deviation: that of the group of which least is told. Infinite where nothing tells; `None` where no lens is looked for.
+    /// How far lenses may move the corners of photographs that are taken for those of pinholes, working pixels, one
+    /// standard deviation: that of the group of which least is told. Infinite where nothing tells; `None` where no lens
+    /// is looked for.
     pub(super) fn doubt_px(&self, pinholes: &Parameters, group_of: &[usize]) -> Option<f64> {
         if self.kind == LensKind::Pinhole {
             return None;
@@ -283,7 +285,8 @@ impl LensSearch<'_> {
         (0..groups).filter(is_asked).map(of_group).max_by(f64::total_cmp)
     }
 
-    /// By how many working pixels a principal point off the middle moves the corners of a photograph beyond what a turn does.
+    /// By how many working pixels a principal point off the middle moves the corners of a photograph beyond what a turn
+    /// does.
     fn off_center_shift(&self, parameters: &Parameters, photograph: usize, [x, y]: [f64; 2]) -> f64 {
         let radius_px = 0.5 * self.problem.priors[photograph].frame.diagonal();
         x.hypot(y) * (radius_px / parameters.focal_px[photograph]).powi(2)

@@ -1,7 +1,8 @@
 //! Levenberg-Marquardt on sparse normal equations.
 //!
 //! # Source
-//! Marquardt, "An algorithm for least-squares estimation of nonlinear parameters" (1963): the diagonal is what is damped.
+//! Marquardt, "An algorithm for least-squares estimation of nonlinear parameters" (1963): the diagonal is what is
+//! damped.
 
 use faer::linalg::solvers::Solve;
 use trueup_core::{Result, StageContext};
@@ -32,7 +33,8 @@ pub(super) trait LeastSquares {
     fn moved(&self, state: &Self::State, step: &faer::Mat<f64>) -> Self::State;
 }
 
-/// Refines `state` until its cost settles: until a step decreases it by less than `settled` of it, or fails and would by its model.
+/// Refines `state` until its cost settles: until a step decreases it by less than `settled` of it, or fails and would
+/// by its model.
 ///
 /// # Errors
 /// [`trueup_core::Error::Cancelled`].
@@ -96,8 +98,8 @@ mod tests {
     use super::super::pair_cost::PairTerm;
     use super::*;
 
-    /// The cost 1 + (x - least)^2, of which the equations say that it is `curvature` times as curved and has a slope that is off by
-    /// `slope_error`.
+    /// The cost 1 + (x - least)^2, of which the equations say that it is `curvature` times as curved and has a slope
+    /// that is off by `slope_error`.
     struct Parabola {
         least: f64,
         curvature: f64,
@@ -129,7 +131,8 @@ mod tests {
         minimize(problem, 0.0, SETTLED, &StageContext::default()).expect("not cancelled")
     }
 
-    /// At the minimum, by a slope of 1e-6 in place of 0: a step of 1e-6 that promises 2e-12 of 1. It is tried once, not with seventeen dampings.
+    /// At the minimum, by a slope of 1e-6 in place of 0: a step of 1e-6 that promises 2e-12 of 1. It is tried once, not
+    /// with seventeen dampings.
     #[test]
     fn where_no_step_promises_anything_none_is_tried_again() {
         let problem = Parabola { least: 0.0, curvature: 1.0, slope_error: 1e-6, costs: Cell::new(0) };

@@ -1,8 +1,8 @@
 //! Start values of focal lengths by the local homographies of all overlaps.
 //!
 //! # Source
-//! Chen and Chuang, "Natural image stitching with the global similarity prior" (2016), section 3.3: more homographies than one a
-//! pair tell more focal lengths, whose median is more robust.
+//! Chen and Chuang, "Natural image stitching with the global similarity prior" (2016), section 3.3: more homographies
+//! than one a pair tell more focal lengths, whose median is more robust.
 
 use nalgebra::Vector2;
 use rayon::prelude::*;
@@ -18,8 +18,8 @@ use crate::moving_dlt::MovingDlt;
 /// Side of the cells at whose vertices homographies are asked, working pixels: that of the mesh as published.
 const CELL_PX: f64 = 40.0;
 
-/// For every photograph the median of the focal lengths, working pixels, that the local homographies from it and to it tell; width and
-/// height together where none tells any, as the authors have it.
+/// For every photograph the median of the focal lengths, working pixels, that the local homographies from it and to it
+/// tell; width and height together where none tells any, as the authors have it.
 pub(super) fn local_focal_lengths(priors: &[CameraPrior], pairs: &[&PairMatches]) -> Vec<f64> {
     let of_pairs: Vec<[Vec<FocalLengths>; 2]> = pairs.par_iter().map(|pair| told_by(pair, priors)).collect();
     let mut told: Vec<Vec<f64>> = vec![Vec::new(); priors.len()];
@@ -90,7 +90,8 @@ mod tests {
         joined(a, b, matched.collect())
     }
 
-    /// The cameras that matches were made with are told, each its own, and a photograph nothing is known of has width and height together.
+    /// The cameras that matches were made with are told, each its own, and a photograph nothing is known of has width
+    /// and height together.
     #[test]
     fn every_photograph_has_the_focal_length_of_its_overlaps() {
         let priors = [CameraPrior::unknown(FRAME, 0); 4];

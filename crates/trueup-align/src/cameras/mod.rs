@@ -1,13 +1,16 @@
 //! Focal lengths, lenses and rotations of the photographs of one component: the paper's R_i.
 //!
-//! Start values come from metadata, from the pair homographies (`homography_focal`) and from a search over a common focal length (`focal`), or as GSP
-//! has them from local homographies (`local_focal`);
-//! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
-//! bundle adjustment (`bundle`), from coarse to fine (`refinement`), photographs that differ with focal lengths of their own where a lens was zoomed or refocused (`zoom`).
-//! Terms of the lenses are added as long as the matches, and
-//! edges that are to be straight (`straightness`), are sure of them (`lenses`, `lens_evidence`; of few overlaps `lens_by_residual`): a pinhole stays one. All this is a `solution`. Pairs that then contradict the others are set
-//! aside (`contradictions`), unless cameras without the weaker ones explain more (`believed`). Focal lengths that parallax leaves open are those that are expected, in part (`expected_focal`), and those through which lines lie at right angles (`directions`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
-//! (`flat_scene`, by `plane_adjustment`), and lines say how it is turned (`upright_plane`).
+//! Start values come from metadata, from the pair homographies (`homography_focal`) and from a search over a common
+//! focal length (`focal`), or as GSP has them from local homographies (`local_focal`); rotations from the spanning tree
+//! and from averaging over all edges (`rotations`); both are refined together by bundle adjustment (`bundle`), from
+//! coarse to fine (`refinement`), photographs that differ with focal lengths of their own where a lens was zoomed or
+//! refocused (`zoom`). Terms of the lenses are added as long as the matches, and edges that are to be straight
+//! (`straightness`), are sure of them (`lenses`, `lens_evidence`; of few overlaps `lens_by_residual`): a pinhole stays
+//! one. All this is a `solution`. Pairs that then contradict the others are set aside (`contradictions`), unless
+//! cameras without the weaker ones explain more (`believed`). Focal lengths that parallax leaves open are those that
+//! are expected, in part (`expected_focal`), and those through which lines lie at right angles (`directions`). Where
+//! rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried (`flat_scene`, by
+//! `plane_adjustment`), and lines say how it is turned (`upright_plane`).
 
 mod believed;
 mod bundle;
@@ -74,15 +77,16 @@ pub struct CameraInput<'a> {
 /// The cameras of one component.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cameras {
-    /// One camera per photograph, in working pixels; the reference photograph's rotation is the identity. Before a plane the
-    /// rotations are from the plane's frame.
+    /// One camera per photograph, in working pixels; the reference photograph's rotation is the identity. Before a
+    /// plane the rotations are from the plane's frame.
     pub cameras: Vec<Camera>,
     /// Whether photographs of a camera have focal lengths of their own, all or those that differ.
     pub per_picture_focal: bool,
     /// Root mean square residual of each pair in working pixels, in the order of the pairs given.
     pub pair_rms_px: Vec<f64>,
-    /// Pairs (positions in the list given) that contradict the others and take no further part. Overlaps for sure that parallax keeps from agreeing are not
-    /// among them: the cameras are found without them, but they are drawn and measured like others.
+    /// Pairs (positions in the list given) that contradict the others and take no further part. Overlaps for sure that
+    /// parallax keeps from agreeing are not among them: the cameras are found without them, but they are drawn and
+    /// measured like others.
     pub contradicting: Vec<usize>,
     /// The plane that the photographs show from places of their own, if the cameras did more than rotate.
     #[serde(default)]
@@ -170,12 +174,15 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
     Ok(Cameras { cameras, per_picture_focal, pair_rms_px, contradicting, flat_scene: None })
 }
 
-/// How many times the agreeing matches that a pair needs show that it is an overlap, whatever it contradicts. Of photographed sets, false ones have 1.4 at most.
+/// How many times the agreeing matches that a pair needs show that it is an overlap, whatever it contradicts. Of
+/// photographed sets, false ones have 1.4 at most.
 const SURE_OVERLAP: f64 = 1.5;
-/// Largest residual of a sure overlap that parallax makes, in units of that from which on the cameras are found without it.
+/// Largest residual of a sure overlap that parallax makes, in units of that from which on the cameras are found without
+/// it.
 const MOST_STRAINED: f64 = 3.0;
 
-/// Whether a pair that contradicts the others is an overlap all the same, which parallax keeps from agreeing with rotating cameras.
+/// Whether a pair that contradicts the others is an overlap all the same, which parallax keeps from agreeing with
+/// rotating cameras.
 fn is_strained(pair: &PairMatches, rms_px: f64, options: &CameraOptions) -> bool {
     pair.agreeing as f64 >= SURE_OVERLAP * pair.needed as f64 && rms_px <= MOST_STRAINED * options.max_pair_rms_px
 }

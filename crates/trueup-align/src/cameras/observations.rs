@@ -47,7 +47,8 @@ impl Observations {
     }
 }
 
-/// Entries of lists of these lengths, as (list, place in it): the first of each list, then the second of each, and so on.
+/// Entries of lists of these lengths, as (list, place in it): the first of each list, then the second of each, and so
+/// on.
 pub(super) fn in_turns(lengths: &[usize]) -> impl Iterator<Item = (usize, usize)> {
     let longest = lengths.iter().copied().max().unwrap_or(0);
     (0..longest).flat_map(move |turn| {

@@ -2,8 +2,8 @@
 
 use trueup_core::options::{InvalidOption, OptionValue};
 
-/// Widest field of view, degrees, of a lens that keeps lines straight: what the shortest focal length that is believed of a
-/// photograph sees.
+/// Widest field of view, degrees, of a lens that keeps lines straight: what the shortest focal length that is believed
+/// of a photograph sees.
 const WIDEST_RECTILINEAR_DEG: f64 = 118.0;
 
 trueup_core::choice! {
@@ -21,9 +21,11 @@ trueup_core::choice! {
 trueup_core::choice! {
     /// What kind of lens took the photographs.
     pub enum LensKind {
-        /// As the matches tell; nearly always a lens that keeps lines straight, but for what they show of its distortion.
+        /// As the matches tell; nearly always a lens that keeps lines straight, but for what they show of its
+        /// distortion.
         Auto = "auto",
-        /// A lens that bends nothing: photographs that were corrected by the camera or a raw developer, or were rendered.
+        /// A lens that bends nothing: photographs that were corrected by the camera or a raw developer, or were
+        /// rendered.
         Pinhole = "pinhole",
         /// A lens that is to keep lines straight, with distortion as the matches tell.
         Rectilinear = "rectilinear",
@@ -35,12 +37,13 @@ trueup_core::choice! {
 trueup_core::choice! {
     /// What the photographs show, and how their cameras moved.
     pub enum SceneModel {
-        /// As the matches tell: rotating cameras, unless these explain them much worse than a plane does that moving cameras see.
+        /// As the matches tell: rotating cameras, unless these explain them much worse than a plane does that moving
+        /// cameras see.
         Auto = "auto",
         /// Anything, by cameras that stayed where they were and turned.
         Rotating = "rotating",
-        /// Something flat, by cameras that moved along it: scans, murals, the ground from the air. It is drawn as it lies in its
-        /// plane.
+        /// Something flat, by cameras that moved along it: scans, murals, the ground from the air. It is drawn as it
+        /// lies in its plane.
         Plane = "plane",
     }
 }
@@ -50,7 +53,8 @@ trueup_core::choice! {
     pub enum StartFocal {
         /// One for all, that by which turning cameras explain the matches best.
         Searched = "searched",
-        /// Each photograph's own: the median of what the homographies around the vertices of its overlaps tell, as GSP has it.
+        /// Each photograph's own: the median of what the homographies around the vertices of its overlaps tell, as GSP
+        /// has it.
         LocalHomographies = "local-homographies",
     }
 }
@@ -58,11 +62,12 @@ trueup_core::choice! {
 trueup_core::options! {
     /// How cameras are found.
     pub struct CameraOptions("cameras") {
-        /// What the photographs show, and how their cameras moved. Say `plane` where a document or a facade that was taken in two
-        /// photographs comes out bent; `rotating` where a flat wall was taken from one place and is drawn as a plane.
+        /// What the photographs show, and how their cameras moved. Say `plane` where a document or a facade that was
+        /// taken in two photographs comes out bent; `rotating` where a flat wall was taken from one place and is drawn
+        /// as a plane.
         scene: SceneModel = SceneModel::Auto, Allowed::Any, "", basic;
-        /// What kind of lens took the photographs. Say it where few photographs overlap, which tell little of a lens, or where
-        /// a line that is straight comes out bent.
+        /// What kind of lens took the photographs. Say it where few photographs overlap, which tell little of a lens,
+        /// or where a line that is straight comes out bent.
         lens: LensKind = LensKind::Auto, Allowed::Any, "", basic;
         /// Field of view of every photograph across its longer side, through the whole lens, by any calibration or
         /// specification; the matches may still change the focal length by up to 5 %. Say it where photographs carry no
@@ -71,14 +76,16 @@ trueup_core::options! {
         /// Which photographs share a focal length. `shared` where the lens was not touched and short rows still bend;
         /// `per-picture` where it was zoomed between photographs and `auto` does not notice.
         focal_sharing: FocalSharing = FocalSharing::Auto, Allowed::Any, "";
-        /// Where the focal lengths of photographs without metadata start from. `local-homographies` to compare with GSP as published.
+        /// Where the focal lengths of photographs without metadata start from. `local-homographies` to compare with GSP
+        /// as published.
         start_focal: StartFocal = StartFocal::Searched, Allowed::Any, "";
         /// Standard deviation of a focal length from metadata, relative. Lower it where the metadata are calibrated;
         /// raise it where a lens reports a focal length that is far from the true one.
         known_focal_sd: f64 = 0.1, between(0.001, 10.0), "";
-        /// Root mean square residual above which the cameras are found without a pair, if the photographs stay connected without
-        /// it. Of such pairs, only those that are overlaps for sure, and differ by up to three times as much, are still drawn
-        /// and measured. Raise it to keep overlaps with parallax; lower it where a wrong pair bends the panorama.
+        /// Root mean square residual above which the cameras are found without a pair, if the photographs stay
+        /// connected without it. Of such pairs, only those that are overlaps for sure, and differ by up to three times
+        /// as much, are still drawn and measured. Raise it to keep overlaps with parallax; lower it where a wrong pair
+        /// bends the panorama.
         max_pair_rms_px: f64 = 10.0, between(0.5, 1000.0), "working px";
     }
 }

@@ -45,7 +45,8 @@ pub(super) fn pair_cost(cameras: &[Camera], pair: &PairObservations, huber_px: f
         .sum()
 }
 
-/// How far a pair's matches lie from where the cameras put them, working pixels, both directions; those behind a camera infinitely far.
+/// How far a pair's matches lie from where the cameras put them, working pixels, both directions; those behind a camera
+/// infinitely far.
 pub(super) fn pair_distances(cameras: &[Camera], pair: &PairObservations) -> Vec<f64> {
     let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
     let distance = |from: &Camera, to: &Camera, source: [f64; 2], target: [f64; 2]| {
@@ -61,8 +62,8 @@ impl<const LOCAL: usize> PairTerm<LOCAL> {
         Self { normal: SMatrix::zeros(), gradient: SVector::zeros() }
     }
 
-    /// Both directions of every match, linearized at these cameras; of unknowns that are held fixed, those without a column,
-    /// nothing is said.
+    /// Both directions of every match, linearized at these cameras; of unknowns that are held fixed, those without a
+    /// column, nothing is said.
     pub(super) fn new(cameras: &[Camera], pair: &PairObservations, columns: &Columns<LOCAL>, huber_px: f64) -> Self {
         let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
         let b_from_a = b.rotation() * a.rotation().transpose();
@@ -204,7 +205,8 @@ impl Transfer<'_> {
         jacobian
     }
 
-    /// The place, and how the residual changes with the rotations and all intrinsics. `None` where a lens does not tell.
+    /// The place, and how the residual changes with the rotations and all intrinsics. `None` where a lens does not
+    /// tell.
     ///
     /// A pixel of `from` stays where it is: its bearing moves so as to undo what the intrinsics do to the pixel.
     fn by_lenses<const LOCAL: usize>(

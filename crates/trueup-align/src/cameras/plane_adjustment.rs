@@ -1,5 +1,5 @@
-//! Bundle adjustment of cameras that move before a plane: focal lengths, rotations and places that bring all matches together
-//! on it.
+//! Bundle adjustment of cameras that move before a plane: focal lengths, rotations and places that bring all matches
+//! together on it.
 //!
 //! A match's point in one photograph is carried to the plane, and from there into the other, both ways, as for rotating
 //! cameras ([`super::bundle`]).
@@ -22,8 +22,8 @@ use super::pair_cost::{Columns, PairTerm, huber};
 use super::plane_camera::PlaneCamera;
 use super::prior::CameraPrior;
 
-/// Unknowns of one photograph: rotation about the plane's axes (3), the axis's point (2), the logarithm of the distance in focal
-/// lengths, that of the focal length, and the lens's first radial term.
+/// Unknowns of one photograph: rotation about the plane's axes (3), the axis's point (2), the logarithm of the distance
+/// in focal lengths, that of the focal length, and the lens's first radial term.
 const OF_EACH: usize = 8;
 /// Those of a photograph that no other shares.
 const OWN: usize = 6;
@@ -35,8 +35,8 @@ const LN_DISTANCE: usize = 5;
 /// The intrinsic unknowns that follow a photograph's own, among those of a camera.
 const INTRINSIC: [usize; 2] = [FOCAL, RADIAL];
 
-/// Standard deviation of a camera's tilt from the plane's normal, radians: people face what is flat. What all photographs
-/// are tilted by alike is not told by photographs taken from afar; of others every match says more.
+/// Standard deviation of a camera's tilt from the plane's normal, radians: people face what is flat. What all
+/// photographs are tilted by alike is not told by photographs taken from afar; of others every match says more.
 const TILT_SD: f64 = 0.17;
 
 /// The state being refined, one entry a photograph. The plane's unit is a pixel of the anchor at its axis.
@@ -77,8 +77,8 @@ pub(super) struct PlaneAdjustment<'a> {
 }
 
 impl PlaneAdjustment<'_> {
-    /// Photographs taken straight on, each turned, scaled and moved so that the matches meet best; `None` if the overlaps leave
-    /// one open. Linear in what is unknown.
+    /// Photographs taken straight on, each turned, scaled and moved so that the matches meet best; `None` if the
+    /// overlaps leave one open. Linear in what is unknown.
     pub(super) fn straight_on(&self, lenses: Vec<LensState>) -> Option<PlaneParameters> {
         /// Of each of two photographs scale and turn as a complex number, and the place of its middle.
         const SIMILARITIES: usize = 8;
@@ -173,7 +173,8 @@ impl PlaneAdjustment<'_> {
         }
     }
 
-    /// Pulls of the focal lengths towards their start values, of lens terms towards 0, and of the axes towards the normal.
+    /// Pulls of the focal lengths towards their start values, of lens terms towards 0, and of the axes towards the
+    /// normal.
     fn pulls(&self, parameters: &PlaneParameters, model: &IntrinsicsModel) -> Vec<Pull> {
         let of_photograph = |k: usize| {
             let stretch = (parameters.focal_px[k] / self.start_focal_px[k]).ln();
@@ -269,7 +270,8 @@ fn pair_term(cameras: &[PlaneCamera], pair: &PairObservations, huber_px: f64) ->
 
 type ByUnknowns = SMatrix<f64, 2, OF_EACH>;
 
-/// The distance of `target` in `to` from where the plane has the pixel `source` of `from`, and how it moves with the unknowns of both.
+/// The distance of `target` in `to` from where the plane has the pixel `source` of `from`, and how it moves with the
+/// unknowns of both.
 ///
 /// A pixel of `from` stays where it is: its place on the plane moves so as to undo what the unknowns do to the pixel.
 fn linearized(

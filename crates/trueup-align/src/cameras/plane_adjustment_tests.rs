@@ -68,8 +68,8 @@ fn the_gradient_by_every_unknown_matches_finite_differences() {
         };
         let step = 1e-6;
         let numeric = (shifted(step) - shifted(-step)) / (2.0 * step);
-        // The cost is the sum of squares; its gradient is twice J^T r. Turning about the normal moves the pull towards it by a
-        // second-order amount, which the equations leave out.
+        // The cost is the sum of squares; its gradient is twice J^T r. Turning about the normal moves the pull towards
+        // it by a second-order amount, which the equations leave out.
         let analytic = 2.0 * gradient[(unknown, 0)];
         assert!((numeric - analytic).abs() < 1e-2 + 1e-4 * analytic.abs(), "{unknown}: {numeric} {analytic}");
         moving += usize::from(numeric != 0.0);
@@ -78,8 +78,8 @@ fn the_gradient_by_every_unknown_matches_finite_differences() {
     assert_eq!(moving, unknowns - 4);
 }
 
-/// Three photographs of a plane by a scanner: the second lies 300 units to the right of the first and is turned by 10 degrees, the third
-/// 200 below at half the resolution.
+/// Three photographs of a plane by a scanner: the second lies 300 units to the right of the first and is turned by 10
+/// degrees, the third 200 below at half the resolution.
 #[test]
 fn photographs_taken_straight_on_are_found_at_once() {
     let priors: Vec<CameraPrior> = [0; 3].map(|group| CameraPrior::unknown(FRAME, group)).to_vec();

@@ -7,8 +7,8 @@ use trueup_core::geometry::{roll_from_down, rotation_about_z};
 
 /// A camera before the plane z = 0: x to the right on it, y down, z away from the photographer.
 ///
-/// Where it stands is told by where its optical axis meets the plane, and from how far: a photograph that is turned about that
-/// point keeps its middle, and one taken straight on from farther away by a longer lens is the same.
+/// Where it stands is told by where its optical axis meets the plane, and from how far: a photograph that is turned
+/// about that point keeps its middle, and one taken straight on from farther away by a longer lens is the same.
 ///
 /// # Source
 /// Hartley and Zisserman, Multiple View Geometry, section 8.1.1: `image_from_plane = K [r1 r2 t]`.
@@ -23,8 +23,8 @@ pub struct PlaneCamera {
 }
 
 impl PlaneCamera {
-    /// Smallest cosine of the angle between a ray and the plane's normal at which the ray is believed to meet the plane: 84
-    /// degrees.
+    /// Smallest cosine of the angle between a ray and the plane's normal at which the ray is believed to meet the
+    /// plane: 84 degrees.
     const GRAZING: f64 = 0.1;
 
     /// The place on the plane, from the camera, in the camera's frame.
@@ -111,8 +111,8 @@ mod tests {
         assert!((straight().pixels_per_unit() - 2.0).abs() < 1e-12);
     }
 
-    /// Turned by atan(3/4) about the vertical, its axis is 4/5 of its length before the plane: 400 units away, 300 aside.
-    /// Straight ahead of the camera's own place, 3/4 of the focal length from the middle, is that foot.
+    /// Turned by atan(3/4) about the vertical, its axis is 4/5 of its length before the plane: 400 units away, 300
+    /// aside. Straight ahead of the camera's own place, 3/4 of the focal length from the middle, is that foot.
     #[test]
     fn a_tilted_camera_sees_its_own_foot_where_its_tilt_says() {
         let world_from_camera = rotation_about_y((0.75_f64).atan());

@@ -12,15 +12,15 @@ use super::options::{CameraOptions, LensKind};
 const MIN_FOCAL: f64 = 0.3;
 /// Longest focal length that is believed, in longer sides of the photograph: an angle of view of 5.7 degrees.
 const MAX_FOCAL: f64 = 10.0;
-/// How far the matches may take a told focal length, as a factor: what is engraved on a lens is rounded, and focusing on near
-/// things changes it.
+/// How far the matches may take a told focal length, as a factor: what is engraved on a lens is rounded, and focusing
+/// on near things changes it.
 const TOLD_FOCAL_REACH: f64 = 1.05;
 /// Standard deviation of an estimated start value of the focal length, relative: it only keeps a focal length that the
 /// matches leave open from running away.
 const ESTIMATED_FOCAL_SD: f64 = 0.3;
 
-/// Focal length that is expected of a photograph of which nothing is known, in its longer sides: telephones' are 0.7 to 0.8, those of
-/// compact cameras and of zoom lenses as they are sold from 0.7 at their shortest to 1.5 and more.
+/// Focal length that is expected of a photograph of which nothing is known, in its longer sides: telephones' are 0.7 to
+/// 0.8, those of compact cameras and of zoom lenses as they are sold from 0.7 at their shortest to 1.5 and more.
 pub const USUAL_FOCAL: f64 = 0.85;
 /// Standard deviation of its logarithm: one of twenty is shorter than 0.38 or longer than 1.9.
 pub(super) const USUAL_FOCAL_SD: f64 = 0.4;
@@ -42,8 +42,8 @@ pub struct CameraPrior {
     pub lens: Option<PlacedLens>,
     /// Photographs with equal numbers were taken with one camera at one size and may share a focal length.
     pub camera_group: usize,
-    /// Photographs with equal numbers were, as far as metadata tell, taken through one lens at one focal length, and may share
-    /// what it does.
+    /// Photographs with equal numbers were, as far as metadata tell, taken through one lens at one focal length, and
+    /// may share what it does.
     pub lens_group: usize,
 }
 
@@ -120,9 +120,9 @@ impl CameraPrior {
         }
     }
 
-    /// Which photographs one lens at one setting may have taken: a number for each. Those held upright are apart from those
-    /// held across, whose pictures were turned: what a lens does aside turns with them. Those whose lens was told are apart
-    /// from the others.
+    /// Which photographs one lens at one setting may have taken: a number for each. Those held upright are apart from
+    /// those held across, whose pictures were turned: what a lens does aside turns with them. Those whose lens was told
+    /// are apart from the others.
     pub(super) fn lens_groups(priors: &[Self]) -> Vec<usize> {
         let key = |prior: &Self| {
             let across = prior.frame.width >= prior.frame.height;

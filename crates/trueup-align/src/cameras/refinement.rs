@@ -35,8 +35,8 @@ pub(super) struct Refined {
     pub per_picture_focal: bool,
     /// Whether no focal length could be found, and those expected were taken.
     pub focal_failed: bool,
-    /// How far lenses may move corners unnoticed, working pixels, one standard deviation; `None` where few overlaps had not to tell
-    /// of them alone, or a lens was found or told.
+    /// How far lenses may move corners unnoticed, working pixels, one standard deviation; `None` where few overlaps had
+    /// not to tell of them alone, or a lens was found or told.
     pub lens_doubt_px: Option<f64>,
     /// The cameras as the matches alone have them, where what lines tell, or is expected, of focal lengths took part.
     pub by_matches: Option<ByMatches>,

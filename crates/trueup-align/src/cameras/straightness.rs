@@ -1,9 +1,9 @@
 //! Straight lines of the scene as evidence for lenses: through the right lens, the rays along an edge lie in one plane.
 //!
 //! # Source
-//! D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37(8), 1971 (the plumb line method). What is
-//! minimized are distances in the photograph, as F. Devernay and O. Faugeras, "Straight lines have to be straight", Machine
-//! Vision and Applications 13(1), 2001, advise.
+//! D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37(8), 1971 (the plumb line method). What
+//! is minimized are distances in the photograph, as F. Devernay and O. Faugeras, "Straight lines have to be straight",
+//! Machine Vision and Applications 13(1), 2001, advise.
 //!
 //! # Departures
 //! Nobody chooses the lines. Whatever edge goes on smoothly takes part, and what is not straight in the scene loses its
@@ -16,10 +16,11 @@ use trueup_core::source::WorkingFrame;
 
 use super::observations::{cell_of, in_turns};
 
-/// How many square pixels of a match's error a square pixel of the mean square distance of an edge from straight is worth:
-/// such a mean scatters by a tenth of what a match does.
+/// How many square pixels of a match's error a square pixel of the mean square distance of an edge from straight is
+/// worth: such a mean scatters by a tenth of what a match does.
 const WORTH: f64 = 100.0;
-/// Root mean square distance of an edge from straight at which it begins to lose influence, in limits of Huber's loss of the matches.
+/// Root mean square distance of an edge from straight at which it begins to lose influence, in limits of Huber's loss
+/// of the matches.
 const LIMIT_SHARE: f64 = 0.1;
 /// Cells along each side of a photograph whose edges may err together: those of one thing.
 const CELLS: usize = 4;
@@ -97,8 +98,8 @@ pub(super) fn curve_cost(cameras: &[Camera], cluster: &CurveCluster, huber_px: f
     cluster.curves.iter().map(cost).sum()
 }
 
-/// Cauchy's loss of a mean square distance, and the weight of its squares. What is not finite costs as much as an edge that
-/// is a photograph off.
+/// Cauchy's loss of a mean square distance, and the weight of its squares. What is not finite costs as much as an edge
+/// that is a photograph off.
 fn cauchy(mean_square: f64, huber_px: f64) -> (f64, f64) {
     const FARTHEST: f64 = 1e6;
     let limit = (LIMIT_SHARE * huber_px).powi(2);
@@ -124,7 +125,8 @@ impl CurveTerm {
     }
 }
 
-/// The plane of an edge, and how the distances from it change with the intrinsics, a row for each; `None` where a ray has no place.
+/// The plane of an edge, and how the distances from it change with the intrinsics, a row for each; `None` where a ray
+/// has no place.
 fn linearized(camera: &Camera, curve: &EdgeCurve) -> Option<(Plane, Vec<RowSVector<f64, INTRINSICS>>)> {
     let rays = rays(camera, curve);
     let derivatives: Vec<ProjectionDerivatives> =
@@ -168,7 +170,8 @@ impl Plane {
         self.distances_px.norm_squared() / self.distances_px.len() as f64
     }
 
-    /// How the distances of its rays change with the intrinsics while the places stay, and the plane turns after them: a row for each.
+    /// How the distances of its rays change with the intrinsics while the places stay, and the plane turns after them:
+    /// a row for each.
     fn jacobian(
         &self,
         rays: &[Vector3<f64>],
@@ -196,8 +199,8 @@ impl Plane {
 
 /// The unit direction in which a scatter is least, by inverse iteration; `None` where it is not finite.
 ///
-/// Rays along an edge scatter a thousand times less across its plane than in it, so that every step gains three digits or
-/// more.
+/// Rays along an edge scatter a thousand times less across its plane than in it, so that every step gains three digits
+/// or more.
 fn flattest(scatter: &Matrix3<f64>) -> Option<Vector3<f64>> {
     /// Steps; where two directions are nearly alike, either does.
     const STEPS: usize = 8;

@@ -23,8 +23,8 @@ fn seen(camera: &Camera) -> Vec<EdgeCurve> {
     ends.iter().flat_map(|&end| [curve(end, true), curve(end, false)]).collect()
 }
 
-/// By hand: at depth 1 and k1 = -0.1 the line y = 0.4 is seen at 0.4 (1 - 0.1 (x^2 + 0.16)), a parabola over x = -0.4 to 0.4 that
-/// is off its mean by 0.4 * 0.1 * 0.16 sqrt(4 / 45) in the mean square: 1.24 px.
+/// By hand: at depth 1 and k1 = -0.1 the line y = 0.4 is seen at 0.4 (1 - 0.1 (x^2 + 0.16)), a parabola over x = -0.4
+/// to 0.4 that is off its mean by 0.4 * 0.1 * 0.16 sqrt(4 / 45) in the mean square: 1.24 px.
 #[test]
 fn a_line_is_straight_through_its_lens_and_bent_without() {
     let line = seen(&camera(-0.1)).remove(7);

@@ -137,7 +137,8 @@ fn a_zoom_is_noticed() {
     }
 }
 
-/// One of eight photographs through a longer lens, or one of a row that two overlap only: fewer than a quarter, which do not move the quartiles.
+/// One of eight photographs through a longer lens, or one of a row that two overlap only: fewer than a quarter, which
+/// do not move the quartiles.
 #[test]
 fn a_zoom_of_one_photograph_is_noticed() {
     for (zoomed, longer) in [(3, 1.6), (5, 0.7), (0, 1.08)] {
@@ -151,7 +152,8 @@ fn a_zoom_of_one_photograph_is_noticed() {
     }
 }
 
-/// An automatic focus moves the corners of photographs, 500 px from the middle, by up to 5 px. The second row has a lens besides, the third has two photographs.
+/// An automatic focus moves the corners of photographs, 500 px from the middle, by up to 5 px. The second row has a
+/// lens besides, the third has two photographs.
 #[test]
 fn focal_lengths_that_the_focus_changes_are_found() {
     let focus = [0.0, 0.7, -0.9, 0.4, -0.2, 1.0, -0.6, 0.3];
@@ -170,7 +172,8 @@ fn focal_lengths_that_the_focus_changes_are_found() {
     }
 }
 
-/// Three photographs, which neither the focus nor the lens explains alone: it moves corners by 500 (500 / 650)^2 0.04 = 12 px, and is off center besides. A pinhole that was told stays one.
+/// Three photographs, which neither the focus nor the lens explains alone: it moves corners by 500 (500 / 650)^2 0.04 =
+/// 12 px, and is off center besides. A pinhole that was told stays one.
 #[test]
 fn a_lens_and_the_focus_are_found_at_once() {
     let focal_px = [650.0, 655.0, 645.0];
@@ -194,7 +197,8 @@ fn a_lens_and_the_focus_are_found_at_once() {
     assert!(cameras.iter().all(|camera| camera.lens.is_pinhole()));
 }
 
-/// Where a lens is sure, what is weaker beside it is found, too: k2, without which k1 is too small by a third, under noise of twice the usual. Photographs of 93 degrees.
+/// Where a lens is sure, what is weaker beside it is found, too: k2, without which k1 is too small by a third, under
+/// noise of twice the usual. Photographs of 93 degrees.
 #[test]
 fn what_hides_beside_a_lens_is_found() {
     for (step_deg, radial) in [(35.0, [-0.06, 0.01, 0.0, 0.0]), (45.0, [-0.05, 0.006, 0.0, 0.0])] {
@@ -274,8 +278,8 @@ fn a_bend_that_does_not_stay_is_no_lens() {
     assert!(found.is_none(), "{:?}", found.map(|found| found.parameters.lenses[0]));
 }
 
-/// Two overlaps have no spread, but through the lens they leave nothing but noise. It moves the corners by 24 px, or nothing but the middle by 7 of
-/// the photographs' 1000 px of diagonal.
+/// Two overlaps have no spread, but through the lens they leave nothing but noise. It moves the corners by 24 px, or
+/// nothing but the middle by 7 of the photographs' 1000 px of diagonal.
 #[test]
 fn a_pair_and_a_triple_from_one_place_tell_their_lens() {
     for (count, k1, off) in [(2, -0.08, [0.0; 2]), (3, -0.08, [0.0; 2]), (2, -0.08, [6.0, -4.0]), (3, 0.0, [-4.0, 6.0])]
@@ -299,7 +303,8 @@ fn a_pair_that_is_far_off_center_tells_no_lens() {
     assert!(cameras.cameras.iter().all(|camera| camera.principal_point == [WIDTH / 2.0, HEIGHT / 2.0]));
 }
 
-/// Parallax bends what a pair says as a lens would, but also otherwise: before a wall that recedes from 3 to 7 focal units, from places 0.2 apart.
+/// Parallax bends what a pair says as a lens would, but also otherwise: before a wall that recedes from 3 to 7 focal
+/// units, from places 0.2 apart.
 #[test]
 fn a_pair_from_two_places_tells_no_lens() {
     let truth = row(ROLLS)[..2].to_vec();

@@ -105,7 +105,8 @@ fn a_lens_is_looked_for_where_none_was_told() {
     assert!(worst_rotation_error(&truth, &cameras) < 0.25);
 }
 
-/// By hand: 90 degrees across a pinhole's longer side are a focal length of half of it, and no pinhole sees half a turn.
+/// By hand: 90 degrees across a pinhole's longer side are a focal length of half of it, and no pinhole sees half a
+/// turn.
 #[test]
 fn a_told_field_of_view_and_a_told_focal_length_do_not_forget_each_other() {
     let of_project = CameraPrior { focal_px: Some(660.0), focal_told: true, ..CameraPrior::unknown(frame(), 0) };

@@ -7,8 +7,8 @@ use trueup_core::lines::LineSegment;
 
 use super::plane_camera::PlaneCamera;
 
-/// Farthest that lines may turn the plane from where the photographs' own up and down have it, radians: 8 degrees. Most people
-/// hold a camera straighter in the mean, and put paper straighter on a scanner.
+/// Farthest that lines may turn the plane from where the photographs' own up and down have it, radians: 8 degrees. Most
+/// people hold a camera straighter in the mean, and put paper straighter on a scanner.
 const FARTHEST: f64 = 0.14;
 /// Distance from the commonest direction up to which a line agrees with it, radians: half a degree.
 const AGREES: f64 = 0.0087;
@@ -27,8 +27,8 @@ struct Direction {
     weight: f64,
 }
 
-/// The clockwise turn, radians, that brings most lines along the rows or columns of the plane; `None` where they do not agree, or
-/// agree on a turn of more than [`FARTHEST`].
+/// The clockwise turn, radians, that brings most lines along the rows or columns of the plane; `None` where they do not
+/// agree, or agree on a turn of more than [`FARTHEST`].
 pub(super) fn turn_by_lines(cameras: &[PlaneCamera], lines: &[Vec<LineSegment>]) -> Option<f64> {
     let directions: Vec<Direction> = cameras
         .iter()

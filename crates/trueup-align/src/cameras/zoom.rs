@@ -4,23 +4,28 @@ use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, Parameters};
 use super::intrinsics::{FOCAL, IntrinsicsModel, ZOOM_SPREAD};
 use super::pair_cost::pair_cost;
 
-/// Share of the squared errors under a common focal length that those with focal lengths of their own may leave where few photographs differ. Parallax bends focal
-/// lengths, too, but leaves more. Measured over all overlaps, of which these are a part: in eight cut sets, where two to six of eight photographs are zoomed, 0.003 at most is
-/// left, in one 0.16; in photographed sets where one or two differ unzoomed 0.7 or more. Of 61 of these one is believed, four photographs by a long lens, and meets no worse.
+/// Share of the squared errors under a common focal length that those with focal lengths of their own may leave where
+/// few photographs differ. Parallax bends focal lengths, too, but leaves more. Measured over all overlaps, of which
+/// these are a part: in eight cut sets, where two to six of eight photographs are zoomed, 0.003 at most is left, in one
+/// 0.16; in photographed sets where one or two differ unzoomed 0.7 or more. Of 61 of these one is believed, four
+/// photographs by a long lens, and meets no worse.
 const MAX_SHARE_LEFT: f64 = 0.2;
 
 /// A zoom that was found.
 pub(super) struct Zoomed {
-    /// Which focal lengths are free: one for each photograph, or, where few differ, one for each of these and one for the rest of a group.
+    /// Which focal lengths are free: one for each photograph, or, where few differ, one for each of these and one for
+    /// the rest of a group.
     pub model: IntrinsicsModel,
     /// From where to refine them.
     pub start: Parameters,
 }
 
-/// Whether focal lengths of their own suit the photographs better than those that groups of `model` share: `own` and `shared` are the cameras refined with either.
+/// Whether focal lengths of their own suit the photographs better than those that groups of `model` share: `own` and
+/// `shared` are the cameras refined with either.
 ///
-/// Where about half of a group or more differs from the rest, that tells. One photograph among many may as well have run away where it overlaps little; so few are
-/// believed where their overlaps fit far better. The others keep sharing theirs, as parallax bends what each tells of its own.
+/// Where about half of a group or more differs from the rest, that tells. One photograph among many may as well have
+/// run away where it overlaps little; so few are believed where their overlaps fit far better. The others keep sharing
+/// theirs, as parallax bends what each tells of its own.
 pub(super) fn found(
     problem: &BundleAdjustment<'_>,
     model: &IntrinsicsModel,
@@ -46,7 +51,8 @@ pub(super) fn found(
     Some(Zoomed { model: IntrinsicsModel::common(&labels), start })
 }
 
-/// Whether overlaps of photographs whose `own` focal lengths differ from the rest of their group fit far better by these than by the `shared` ones.
+/// Whether overlaps of photographs whose `own` focal lengths differ from the rest of their group fit far better by
+/// these than by the `shared` ones.
 pub(super) fn fits_far_better(
     problem: &BundleAdjustment<'_>,
     model: &IntrinsicsModel,
@@ -74,7 +80,8 @@ pub(super) fn differing(model: &IntrinsicsModel, shared: &Parameters, own: &Para
     differs
 }
 
-/// Logarithms of the own focal lengths by the shared ones, ascending, each with its photograph, of every group of `model`.
+/// Logarithms of the own focal lengths by the shared ones, ascending, each with its photograph, of every group of
+/// `model`.
 fn focal_ratios(model: &IntrinsicsModel, shared: &Parameters, own: &Parameters) -> Vec<Vec<(f64, usize)>> {
     let of_group = |group: usize| {
         let members = (0..own.focal_px.len()).filter(|&k| model.parameters_of[k][FOCAL] == Some(group));

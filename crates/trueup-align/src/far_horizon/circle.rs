@@ -20,7 +20,8 @@ const MOST_CIRCLES: usize = 6;
 const MAX_TILT: f64 = 0.44;
 /// Verticals nearer than this are one, radians (half a degree).
 const SAME: f64 = 0.0087;
-/// Farthest that an edge may lie from a circle that is tried, radians (0.4 degrees): the horizon dips by as much from a cliff of 150 m.
+/// Farthest that an edge may lie from a circle that is tried, radians (0.4 degrees): the horizon dips by as much from a
+/// cliff of 150 m.
 const NEAR_TRIED: f64 = 0.007;
 /// The same of the circle that is fitted (0.3 degrees): low shores.
 const NEAR: f64 = 0.0052;
@@ -40,7 +41,8 @@ const CELL_DEVIATION: f64 = 0.0014;
 const EXPECTED_CELLS: f64 = 4.0;
 /// Neighboring cells that err alike: shores and ridges rise and fall over tens of degrees.
 const ALIKE_CELLS: f64 = 4.0;
-/// What a whole side of the horizon errs by alike, radians about every axis (0.1 degrees): land beyond the water, plains that slope.
+/// What a whole side of the horizon errs by alike, radians about every axis (0.1 degrees): land beyond the water,
+/// plains that slope.
 const COMMON_DEVIATION: f64 = 0.0017;
 /// Two angles and a dip are fitted.
 const FITTED: f64 = 3.0;
@@ -289,8 +291,8 @@ mod tests {
         (from..to).map(edge).collect()
     }
 
-    /// All round the dip is told from the vertical. Of 36 cells each axis sees the squares of 36 cosines, 18; none is off, so that their variance is what four
-    /// expected ones leave of 33 + 4; four neighbors err alike.
+    /// All round the dip is told from the vertical. Of 36 cells each axis sees the squares of 36 cosines, 18; none is
+    /// off, so that their variance is what four expected ones leave of 33 + 4; four neighbors err alike.
     #[test]
     fn all_round_the_dip_is_known_apart_from_the_vertical() {
         let edges = horizon(0.004, 0, 360);
@@ -302,7 +304,8 @@ mod tests {
         assert!((circle.deviation() - expected).abs() < 0.02 * expected, "{} and {expected}", circle.deviation());
     }
 
-    /// Over 60 degrees a dip looks like a pitch: the vertical is off by what the dip is beyond the expected one, which its deviation knows.
+    /// Over 60 degrees a dip looks like a pitch: the vertical is off by what the dip is beyond the expected one, which
+    /// its deviation knows.
     #[test]
     fn over_a_narrow_view_a_dip_is_a_pitch() {
         let edges = horizon(0.004, 0, 60);

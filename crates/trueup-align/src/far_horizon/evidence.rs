@@ -4,13 +4,14 @@ use super::circle::{HorizonCircle, STEPS, cover};
 use super::edges::SkyEdge;
 use super::view::{Color, View};
 
-/// Least azimuth over which an edge must lie on the horizon, degrees. Reasoned: roofs and walls seldom take as much of what is seen.
+/// Least azimuth over which an edge must lie on the horizon, degrees. Reasoned: roofs and walls seldom take as much of
+/// what is seen.
 const MIN_FOUND: usize = 40;
-/// Least azimuth between the outermost of these edges, degrees. Reasoned: a straight edge of the scene takes as much only if it is 1.5 times as long as it is far;
-/// and over less the eye's height over the sea is taken for a pitch.
+/// Least azimuth between the outermost of these edges, degrees. Reasoned: a straight edge of the scene takes as much
+/// only if it is 1.5 times as long as it is far; and over less the eye's height over the sea is taken for a pitch.
 const MIN_EXTENT: usize = 75;
-/// Least share of what photographs show of the circle on which an edge must lie; foreground may hide the rest. Measured: cut scenes of which rocks hide 70 % have 0.2; a
-/// roof of a full turn has 0.16.
+/// Least share of what photographs show of the circle on which an edge must lie; foreground may hide the rest.
+/// Measured: cut scenes of which rocks hide 70 % have 0.2; a roof of a full turn has 0.16.
 const MIN_FOUND_SHARE: f64 = 0.2;
 /// Fewest photographs that must show it: in one, a line that a lens bends and a tilted straight one are alike.
 const MIN_PHOTOGRAPHS: usize = 2;
@@ -18,8 +19,8 @@ const MIN_PHOTOGRAPHS: usize = 2;
 const MIN_IN_PHOTOGRAPH: usize = 4;
 /// Largest share, by what was found, over which sky may go on below the circle: beyond the end of a roof it does.
 const MAX_OPEN_SHARE: f64 = 0.1;
-/// Least share of what was found that has sky far up, or quiet ground below. Measured: scenes with a horizon have 0.75 and more of both; most edges of rooms, facades
-/// and trees fail one of them.
+/// Least share of what was found that has sky far up, or quiet ground below. Measured: scenes with a horizon have 0.75
+/// and more of both; most edges of rooms, facades and trees fail one of them.
 const MIN_LOOKS_SHARE: f64 = 0.6;
 /// Largest step between neighbors far up in the sky, by the difference across the horizon: clouds.
 const MAX_SKY_STEP: f64 = 0.6;

@@ -1,12 +1,14 @@
-//! The far horizon of sea or plain, where photographs show it beyond doubt: a long smooth edge under open sky that lies on one circle all along.
+//! The far horizon of sea or plain, where photographs show it beyond doubt: a long smooth edge under open sky that lies
+//! on one circle all along.
 //!
-//! Whatever is straight in the scene lies on a great circle of directions, a roof or a rail as much as the horizon. What tells them apart is what stands
-//! at the edge: above the horizon is sky, everywhere, and sky is nowhere below it. A roof ends, and beyond its end sky goes on downward. Where
-//! something hides the horizon, it stands up into the sky and is no sky itself. And the horizon is long, in more than one photograph, and lies where
-//! cameras that are held by hand may have it.
+//! Whatever is straight in the scene lies on a great circle of directions, a roof or a rail as much as the horizon.
+//! What tells them apart is what stands at the edge: above the horizon is sky, everywhere, and sky is nowhere below it.
+//! A roof ends, and beyond its end sky goes on downward. Where something hides the horizon, it stands up into the sky
+//! and is no sky itself. And the horizon is long, in more than one photograph, and lies where cameras that are held by
+//! hand may have it.
 //!
-//! Files: `view` samples the small copies of the photographs, `edges` finds the edges under sky, `circle` lays a circle through them and says how sure
-//! it is, `evidence` looks along all of the circle.
+//! Files: `view` samples the small copies of the photographs, `edges` finds the edges under sky, `circle` lays a circle
+//! through them and says how sure it is, `evidence` looks along all of the circle.
 
 mod circle;
 mod edges;
@@ -51,8 +53,9 @@ pub struct FarHorizon {
     pub photographs: usize,
 }
 
-/// Finds the far horizon in photographs seen through their `cameras`, which are expected to be held so that `expected` is about down;
-/// `is_plausible` says whether they may have been held with a given direction down. `None` where there is none beyond doubt.
+/// Finds the far horizon in photographs seen through their `cameras`, which are expected to be held so that `expected`
+/// is about down; `is_plausible` says whether they may have been held with a given direction down. `None` where there
+/// is none beyond doubt.
 pub fn find(
     photographs: &[ShownPhotograph<'_>],
     cameras: &[Camera],

@@ -33,7 +33,8 @@ const SEA: Painted = Painted {
     edge: |azimuth| (azimuth < 0.5).then_some(0.0),
 };
 
-/// The straight edge of a long roof whose nearest point is 6 degrees up, from 40 degrees on the left to 30 on the right; sky beside it.
+/// The straight edge of a long roof whose nearest point is 6 degrees up, from 40 degrees on the left to 30 on the
+/// right; sky beside it.
 const ROOF: Painted = Painted {
     color: |direction| {
         let azimuth = azimuth(direction);
@@ -60,7 +61,8 @@ const RAIL: Painted = Painted {
     edge: |_| Some(0.0),
 };
 
-/// Photographs of a painted world, rolled and looking up in turns, and their cameras in a common frame that is turned by `gauge`.
+/// Photographs of a painted world, rolled and looking up in turns, and their cameras in a common frame that is turned
+/// by `gauge`.
 struct Taken {
     cameras: Vec<Camera>,
     curves: Vec<Vec<EdgeCurve>>,
@@ -172,7 +174,8 @@ fn too_little_of_a_horizon_does_not_tell() {
     assert!(find(&[], &[], &Vector3::y(), |_| true).is_none());
 }
 
-/// A camera that looks at rocks alone, away from the others, sees none of it, and of a small copy that is smaller than it says the last pixels stand for what is missing.
+/// A camera that looks at rocks alone, away from the others, sees none of it, and of a small copy that is smaller than
+/// it says the last pixels stand for what is missing.
 #[test]
 fn views_of_something_else_do_not_tell() {
     let held = taken(&SEA, &[-60.0, -30.0, 0.0, 120.0]);

@@ -7,7 +7,8 @@ use trueup_core::raster::{Raster, luma_256ths};
 
 use super::ShownPhotograph;
 
-/// Nearest to an edge that colors are taken, radians (0.6 degrees): haze and the eye's height leave that to sea and sky alike.
+/// Nearest to an edge that colors are taken, radians (0.6 degrees): haze and the eye's height leave that to sea and sky
+/// alike.
 const NEAREST: f64 = 0.0105;
 /// The same in pixels of the small copy, whose pixels mix both sides.
 const NEAREST_PX: f64 = 2.0;
@@ -60,7 +61,8 @@ impl<'a> View<'a> {
         (self.world_from_camera * self.camera.bearing(Vector2::new(x, y))).normalize()
     }
 
-    /// Whether what lies next to `direction` is brighter above than below, so that a look at more of it is worth its time.
+    /// Whether what lies next to `direction` is brighter above than below, so that a look at more of it is worth its
+    /// time.
     pub(super) fn is_brighter_above(&self, direction: &Vector3<f64>, down: &Vector3<f64>) -> bool {
         let Some(downward) = downward(direction, down) else { return false };
         let beside = [-self.nearest, self.nearest].map(|angle| self.color_beside(direction, &downward, angle));
@@ -70,7 +72,8 @@ impl<'a> View<'a> {
         above > below
     }
 
-    /// The colors on both sides of `direction`, toward `-down` and `down`; `None` where the photograph does not show them all.
+    /// The colors on both sides of `direction`, toward `-down` and `down`; `None` where the photograph does not show
+    /// them all.
     pub(super) fn sides(&self, direction: &Vector3<f64>, down: &Vector3<f64>) -> Option<Sides> {
         let downward = downward(direction, down)?;
         let mut sides = Sides { above: [Color::zeros(); SAMPLES], below: [Color::zeros(); SAMPLES] };
@@ -82,12 +85,13 @@ impl<'a> View<'a> {
         Some(sides)
     }
 
-    /// The largest difference between neighbors among colors of which the first is the outermost above, and the others lie farther up, as far as the
-    /// photograph shows them.
+    /// The largest difference between neighbors among colors of which the first is the outermost above, and the others
+    /// lie farther up, as far as the photograph shows them.
     pub(super) fn largest_step_up(&self, direction: &Vector3<f64>, down: &Vector3<f64>, sides: &Sides) -> f64 {
         let Some(downward) = downward(direction, down) else { return 0.0 };
         let (mut last, mut largest) = (sides.above[SAMPLES - 1], 0.0_f64);
-        // Pixels of a small copy with a short focal length are so wide that the outermost color is from beyond the first of these.
+        // Pixels of a small copy with a short focal length are so wide that the outermost color is from beyond the
+        // first of these.
         let outermost = DISTANCES[SAMPLES - 1] * self.nearest;
         for height in FAR_UP.into_iter().filter(|height| *height > outermost) {
             let Some(color) = self.color_beside(direction, &downward, -height) else { break };

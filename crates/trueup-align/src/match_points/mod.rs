@@ -55,8 +55,8 @@ impl OverlapWarp {
 trueup_core::choice! {
     /// How a grid vertex is carried into another photograph.
     pub enum TransferModel {
-        /// The cameras' transfer, corrected by the matches' local deviation from it; under parallax, as far as neighboring
-        /// matches agree that the cameras are wrong, a homography fitted to the matches around the vertex.
+        /// The cameras' transfer, corrected by the matches' local deviation from it; under parallax, as far as
+        /// neighboring matches agree that the cameras are wrong, a homography fitted to the matches around the vertex.
         CameraResidual = "camera-residual",
         /// A homography fitted to the matches around the vertex (APAP), as published.
         MovingDlt = "moving-dlt",
@@ -143,10 +143,10 @@ impl Transfer<'_> {
     /// By the cameras, corrected, where the photographs were taken from one point, and by the matches where they were
     /// not: the mean of both, weighed by how far neighboring matches agree that the cameras are wrong.
     ///
-    /// The noise of matches has nothing in common: photographs taken from one point keep the cameras' consistency. Where the
-    /// cameras are wrong and the matches far, nothing is known: a vertex is carried if the matches around it count for
-    /// [`FIXING_MATCHES`] times the share of what they say, and no farther from where the cameras have it than any match lies from there: what
-    /// goes beyond all matches was not told by them.
+    /// The noise of matches has nothing in common: photographs taken from one point keep the cameras' consistency.
+    /// Where the cameras are wrong and the matches far, nothing is known: a vertex is carried if the matches around it
+    /// count for [`FIXING_MATCHES`] times the share of what they say, and no farther from where the cameras have it
+    /// than any match lies from there: what goes beyond all matches was not told by them.
     fn by_cameras_and_matches(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<Vector2<f64>>> {
         let cameras = CameraResidual::new(self.cameras, self.source, self.target);
         let by_cameras = (0..grid.len()).map(|vertex| cameras.at(grid.source(vertex)));

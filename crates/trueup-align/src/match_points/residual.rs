@@ -12,14 +12,14 @@ pub(super) const MAX_DEVIATION: f64 = 0.1;
 /// Carries points from one photograph to another by the cameras, plus a smooth correction.
 ///
 /// The correction at a place is a local linear regression of the matches' deviations from the cameras, weighted by
-/// distance and robustly, and drawn towards zero: as strongly as the noise of a match exceeds what neighbors have in common
-/// (the ridge of best linear prediction). Where the photographs were taken from one point it vanishes and the
-/// places are as consistent as the cameras. So it does where only things that moved themselves deviate. Deviations of several planes it follows only in
-/// part, see [`Self::common_square`].
+/// distance and robustly, and drawn towards zero: as strongly as the noise of a match exceeds what neighbors have in
+/// common (the ridge of best linear prediction). Where the photographs were taken from one point it vanishes and the
+/// places are as consistent as the cameras. So it does where only things that moved themselves deviate. Deviations of
+/// several planes it follows only in part, see [`Self::common_square`].
 ///
 /// # Source
-/// A. E. Hoerl and R. W. Kennard, "Ridge regression: biased estimation for nonorthogonal problems" (1970): the best ridge is the
-/// variance of the noise over that of the coefficients.
+/// A. E. Hoerl and R. W. Kennard, "Ridge regression: biased estimation for nonorthogonal problems" (1970): the best
+/// ridge is the variance of the noise over that of the coefficients.
 ///
 /// # Departures
 /// The published method carries vertices by moving DLT from the matches alone. On rotating cameras that adds the noise
@@ -29,7 +29,8 @@ pub(super) struct CameraResidual<'a> {
     samples: Vec<Sample>,
     /// See [`Self::common_square`].
     common_square: f64,
-    /// Strength, in matches, with which corrections are drawn towards none; infinite where the cameras explain all matches to their noise.
+    /// Strength, in matches, with which corrections are drawn towards none; infinite where the cameras explain all
+    /// matches to their noise.
     shrinkage: f64,
     /// Farthest outside the other photograph that a correction could still bring a point in.
     margin: f64,
@@ -58,8 +59,8 @@ fn gaps(samples: &[Sample]) -> Vec<OverlapGap> {
     samples.iter().map(gap).collect()
 }
 
-/// Without those of things that moved, where all others say that the cameras are right; with what neighbors' deviations have in common, in the
-/// mean of all.
+/// Without those of things that moved, where all others say that the cameras are right; with what neighbors' deviations
+/// have in common, in the mean of all.
 fn of_what_stayed(samples: Vec<Sample>) -> (Vec<Sample>, CommonSquare) {
     let is_negligible = |common: CommonSquare| evidence::share(common.sure(), FULL_PX) <= NEGLIGIBLE_SHARE;
     let all = gaps(&samples);
@@ -84,8 +85,8 @@ fn mean_square(samples: &[Sample]) -> f64 {
     if sum.1 > 0.0 { 0.5 * sum.0 / sum.1 } else { 0.0 }
 }
 
-/// The variance of a match's noise over that of what neighbors have in common, not below [`LEAST_SHRINKAGE`]; infinite without anything in
-/// common.
+/// The variance of a match's noise over that of what neighbors have in common, not below [`LEAST_SHRINKAGE`]; infinite
+/// without anything in common.
 fn shrinkage(mean_square: f64, common_square: f64) -> f64 {
     let noise = (mean_square - common_square).max(0.0);
     let ratio = noise / common_square;
@@ -121,13 +122,14 @@ impl<'a> CameraResidual<'a> {
         (correction.norm() <= self.margin).then(|| place + correction)
     }
 
-    /// Square, per axis, of the deviation that neighboring matches have in common, in the mean of all: parallax, as far as noise
-    /// surely does not explain it.
+    /// Square, per axis, of the deviation that neighboring matches have in common, in the mean of all: parallax, as far
+    /// as noise surely does not explain it.
     pub(super) fn common_square(&self) -> f64 {
         self.common_square
     }
 
-    /// Farthest that any match deviates from the cameras, pixels; of what stayed, where nothing but things that moved deviates.
+    /// Farthest that any match deviates from the cameras, pixels; of what stayed, where nothing but things that moved
+    /// deviates.
     pub(super) fn largest_deviation(&self) -> f64 {
         self.samples.iter().map(|sample| sample.deviation.norm()).fold(0.0, f64::max)
     }
@@ -213,8 +215,8 @@ mod tests {
         residual.at(point).expect("inside") - point
     }
 
-    /// Neighbors that deviate to opposite sides have nothing in common: the cameras stay exactly what they are. A shift that all have is
-    /// followed, but for the least shrinkage beside the matches around.
+    /// Neighbors that deviate to opposite sides have nothing in common: the cameras stay exactly what they are. A shift
+    /// that all have is followed, but for the least shrinkage beside the matches around.
     #[test]
     fn noise_corrects_nothing_and_a_common_shift_all() {
         let side = |column: usize, row: usize| if (column + row).is_multiple_of(2) { 0.4 } else { -0.4 };
@@ -224,7 +226,8 @@ mod tests {
         assert!((found - shift).norm() < 0.02, "{found}");
     }
 
-    /// A thing that covers a fifth of the overlap, around the point, went 12 px to the right; all else is where the cameras have it.
+    /// A thing that covers a fifth of the overlap, around the point, went 12 px to the right; all else is where the
+    /// cameras have it.
     #[test]
     fn what_moved_corrects_nothing() {
         let is_thing = |column: usize, row: usize| (9..23).contains(&column) && (7..18).contains(&row);

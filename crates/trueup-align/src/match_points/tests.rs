@@ -186,8 +186,8 @@ fn without_a_homography_the_cameras_carry() {
     }
 }
 
-/// With matches on the left alone, vertices on the right are carried by cameras that are right; where the cameras are wrong, nothing tells
-/// where they belong.
+/// With matches on the left alone, vertices on the right are carried by cameras that are right; where the cameras are
+/// wrong, nothing tells where they belong.
 #[test]
 fn under_parallax_vertices_far_from_all_matches_are_not_carried() {
     let (frames, cameras, pair) = example();

@@ -152,8 +152,8 @@ impl AlignmentEnergy {
     }
 }
 
-/// For every photograph and grid cell (row-major), whether one of `carried`, photographs and their vertices, lies in it: a
-/// vertex carried elsewhere counts for the cell to its lower right.
+/// For every photograph and grid cell (row-major), whether one of `carried`, photographs and their vertices, lies in
+/// it: a vertex carried elsewhere counts for the cell to its lower right.
 pub(super) fn overlap_cells(grids: &[GridMesh], carried: impl Iterator<Item = [usize; 2]>) -> Vec<Vec<bool>> {
     let mut cells: Vec<Vec<bool>> =
         grids.iter().map(|grid| vec![false; (grid.rows - 1) * (grid.columns - 1)]).collect();

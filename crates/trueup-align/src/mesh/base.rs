@@ -78,8 +78,9 @@ fn sized<'a>(cameras: &'a [Camera], grids: &'a [GridMesh]) -> impl Iterator<Item
 /// Pitch of what is looked at steeply, radians, 40 degrees.
 const STEEP: f64 = 0.7;
 
-/// The turn about the horizontal axis that brings a steep panorama's mean direction level; `None` if it is not steep, or shows the horizon all
-/// round as well, as a drone's does beside photographs that look down. Photographs are cameras with their sizes.
+/// The turn about the horizontal axis that brings a steep panorama's mean direction level; `None` if it is not steep,
+/// or shows the horizon all round as well, as a drone's does beside photographs that look down. Photographs are cameras
+/// with their sizes.
 pub(crate) fn tilt_from_level<'a>(
     photographs: impl Iterator<Item = (&'a Camera, [f64; 2])> + Clone,
     level_from_world: &Matrix3<f64>,
@@ -183,8 +184,8 @@ impl BaseMap {
         Self { factor: Vector2::new(scale * theta.cos(), scale * theta.sin()), view: BaseView::Photograph }
     }
 
-    /// The place of a pixel. Not a number where a photograph of a flat scene looks past its plane, which no vertex of those whose
-    /// cameras were found does.
+    /// The place of a pixel. Not a number where a photograph of a flat scene looks past its plane, which no vertex of
+    /// those whose cameras were found does.
     pub fn at(&self, pixel: Vector2<f64>) -> Vector2<f64> {
         let seen = match &self.view {
             BaseView::Photograph => pixel,

@@ -11,8 +11,8 @@ pub(super) const MEMBERS: usize = 8;
 /// Unordered couplings of them.
 const COUPLINGS: usize = MEMBERS * (MEMBERS + 1) / 2;
 
-/// Sums of the normal equations of many residuals over the same eight vertices: those of the first photograph's cell (top
-/// left, top right, bottom right, bottom left), then those of the second's.
+/// Sums of the normal equations of many residuals over the same eight vertices: those of the first photograph's cell
+/// (top left, top right, bottom right, bottom left), then those of the second's.
 ///
 /// They are summed here first because the large matrix is far away, in memory and in look-ups.
 #[derive(Debug, Clone)]
@@ -31,8 +31,8 @@ impl CellPair {
         Self { first, couplings: [[0.0; COUPLINGS]; 3], right: [[0.0; MEMBERS]; 2] }
     }
 
-    /// Adds the square of (sum of the vertices by their `shares`) - value, weighed by `metric`, of which `pull` is the metric
-    /// times the value.
+    /// Adds the square of (sum of the vertices by their `shares`) - value, weighed by `metric`, of which `pull` is the
+    /// metric times the value.
     pub(super) fn add(&mut self, shares: &[f64; MEMBERS], metric: Metric, pull: Vector2<f64>) {
         let mut products = [0.0; COUPLINGS];
         let mut coupling = 0;

@@ -1,11 +1,11 @@
 //! The Cholesky factor of the vertices' normal matrix.
 //!
-//! Energies that turn and scale alike in all directions couple vertices as complex numbers: x + i y of one with a factor of x + i y of the
-//! other. Where all do, as in a mesh that lines and pixels have not refined, the factor is complex: half of the entries of a real one, and half
-//! of the multiplications.
+//! Energies that turn and scale alike in all directions couple vertices as complex numbers: x + i y of one with a
+//! factor of x + i y of the other. Where all do, as in a mesh that lines and pixels have not refined, the factor is
+//! complex: half of the entries of a real one, and half of the multiplications.
 //!
-//! A factor that is very large, or serves rounds of refinement, is in single precision: half of the memory and of the time. It then is a
-//! preconditioner, with which the solver comes to the same solution.
+//! A factor that is very large, or serves rounds of refinement, is in single precision: half of the memory and of the
+//! time. It then is a preconditioner, with which the solver comes to the same solution.
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::perm::{Perm, PermRef};
@@ -17,8 +17,8 @@ use faer::{Conj, c32, c64};
 
 use super::normal_equations::PlacedBlock;
 
-/// Real numbers of a factor beyond which it is in single precision where its solution is wanted to rounding: 134 MB of double ones. Meshes of some
-/// eighty photographs of the working size have so many.
+/// Real numbers of a factor beyond which it is in single precision where its solution is wanted to rounding: 134 MB of
+/// double ones. Meshes of some eighty photographs of the working size have so many.
 pub(super) const MOST_DOUBLES: usize = 1 << 24;
 
 /// A lower triangle L with L L^H = A, as nearly as its numbers are precise.
@@ -42,8 +42,9 @@ pub(super) struct Triangle<T> {
 }
 
 impl VertexFactor {
-    /// The factor of the matrix of so many `vertices`, given its `blocks`, of which every vertex has one with itself, in single precision if it has
-    /// more than `most_doubles` real numbers; `None` if that is not positive definite, or its factor does not fit into memory.
+    /// The factor of the matrix of so many `vertices`, given its `blocks`, of which every vertex has one with itself,
+    /// in single precision if it has more than `most_doubles` real numbers; `None` if that is not positive definite, or
+    /// its factor does not fit into memory.
     pub(super) fn new(vertices: usize, blocks: &[PlacedBlock], most_doubles: usize) -> Option<Self> {
         let order = elimination_order(vertices, blocks)?;
         if blocks.iter().all(|(_, _, block)| turns_and_scales(block)) {
@@ -222,7 +223,8 @@ impl<T: ComplexField> Triangle<T> {
     }
 }
 
-/// The order in which the vertices are eliminated so that few couplings come about; both coordinates of each couple with the same others.
+/// The order in which the vertices are eliminated so that few couplings come about; both coordinates of each couple
+/// with the same others.
 ///
 /// # Source
 /// P. R. Amestoy, T. A. Davis and I. S. Duff, "An approximate minimum degree ordering algorithm" (1996).
@@ -252,7 +254,8 @@ mod tests {
     use super::super::normal_equations::{NormalEquations, WeightedVertex};
     use super::*;
 
-    /// Against the equations themselves, in real numbers: once all turn and scale, once a vertex is held in one direction alone; in both precisions.
+    /// Against the equations themselves, in real numbers: once all turn and scale, once a vertex is held in one
+    /// direction alone; in both precisions.
     #[test]
     fn the_factor_solves_its_own_matrix() {
         for most_doubles in [usize::MAX, 0] {

@@ -78,10 +78,11 @@ impl StraightInput<'_> {
 }
 
 /// How much of the distance at which matched points land in `grids` is common to neighbors: the mean over the points of
-/// the shares that they would have of their weights, and 0 where noise alone may have it. Shares are never negative, so that noise comes to some: to the more, the worse matches are found.
+/// the shares that they would have of their weights, and 0 where noise alone may have it. Shares are never negative, so
+/// that noise comes to some: to the more, the worse matches are found.
 ///
-/// Cameras that moved leave most of what they show a little apart; what moved itself lies far from where it was, and leaves all else where it is. The farthest of every overlap are
-/// therefore not asked ([`evidence::still`]).
+/// Cameras that moved leave most of what they show a little apart; what moved itself lies far from where it was, and
+/// leaves all else where it is. The farthest of every overlap are therefore not asked ([`evidence::still`]).
 pub(super) fn misaligned_share(points: &[PairMatches], grids: &CurrentGrids) -> f64 {
     /// Points of a pair that are asked; more hardly change the mean.
     const ASKED: usize = 400;
@@ -191,11 +192,11 @@ impl LineAlignmentInput<'_> {
     /// The equations of matched lines and matched points around the current grids, with the `shares` of their weights;
     /// matches `robust_px` apart have half of that.
     pub(super) fn cells(&self, grids: &CurrentGrids, shares: &MatchShares, robust_px: f64) -> Vec<CellPairs> {
-        /// Weight of the squared distance of matched points, per working px squared; published: 1, without outlines that
-        /// are held and match points that know nothing of parallax.
+        /// Weight of the squared distance of matched points, per working px squared; published: 1, without outlines
+        /// that are held and match points that know nothing of parallax.
         const POINT_WEIGHT: f64 = 16.0;
-        /// That of those elsewhere in depth, which are few. With it for all points the mesh follows their noise: what was not matched meets worse in the
-        /// median, and pixels agree less (45 pairs and small sets).
+        /// That of those elsewhere in depth, which are few. With it for all points the mesh follows their noise: what
+        /// was not matched meets worse in the median, and pixels agree less (45 pairs and small sets).
         const ELSEWHERE_WEIGHT: f64 = 64.0;
         let of_lines = |(pair, shares): (&PairLines, &Vec<f64>)| {
             let mut cells = CellPairs::between([pair.a, pair.b]);
@@ -247,8 +248,8 @@ impl MatchedLines {
     }
 }
 
-/// The matched points of a pair that count, as indices with places in both photographs: at most [`MAX_POINTS`] of those on planes, and as many
-/// elsewhere.
+/// The matched points of a pair that count, as indices with places in both photographs: at most [`MAX_POINTS`] of those
+/// on planes, and as many elsewhere.
 fn chosen(pair: &PairMatches) -> impl Iterator<Item = (usize, [Vector2<f64>; 2])> + use<'_> {
     let planes = pair.inliers.len();
     let counts = move |k: usize| match k.checked_sub(planes) {

@@ -67,8 +67,8 @@ pub(crate) use warped_mesh::count_folds;
 
 /// Deforms the undeformed grids so that overlaps align and every edge keeps to its photograph's base.
 ///
-/// A full turn is closed if its ends can meet and the closed grid has a solution; otherwise the warning `full-turn-open` says why not,
-/// and it is left open.
+/// A full turn is closed if its ends can meet and the closed grid has a solution; otherwise the warning
+/// `full-turn-open` says why not, and it is left open.
 ///
 /// # Errors
 /// [`trueup_core::Error::Unsolvable`] if the system is not positive definite or the solution is not finite;

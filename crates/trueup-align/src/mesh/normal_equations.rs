@@ -341,8 +341,8 @@ pub(super) fn solved_grids(grids: &[GridMesh], solution: &[f64]) -> Vec<GridMesh
     grids.iter().map(&mut of_grid).collect()
 }
 
-/// Blocks in the order of their columns, in their given order within a column (counting sort). They are listed by rising
-/// row: so each column comes out sorted.
+/// Blocks in the order of their columns, in their given order within a column (counting sort). They are listed by
+/// rising row: so each column comes out sorted.
 fn by_column(blocks: &[PlacedBlock], columns: usize) -> Vec<PlacedBlock> {
     let mut next = vec![0_usize; columns + 1];
     for block in blocks {

@@ -14,8 +14,9 @@ trueup_core::choice! {
 trueup_core::options! {
     /// How the grids are deformed.
     pub struct MeshOptions("mesh") {
-        /// Largest side of a grid cell; of more than some 180 photographs cells are larger, so that all grids together keep as many
-        /// vertices. Lower it where parallax changes within a cell; time and memory grow with its inverse square.
+        /// Largest side of a grid cell; of more than some 180 photographs cells are larger, so that all grids together
+        /// keep as many vertices. Lower it where parallax changes within a cell; time and memory grow with its inverse
+        /// square.
         cell_px: f64 = 40.0, between(4.0, 1000.0), "working px";
         /// The shape that the similarity prior asks of each photograph. Choose the similarity to compare with published
         /// results.

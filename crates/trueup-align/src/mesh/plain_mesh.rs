@@ -88,16 +88,18 @@ impl<'a> PlainMesh<'a> {
         context: &StageContext,
     ) -> Result<Self> {
         let problem = layout.problem(&input, options, context);
-        // Equations and factor are not kept for refinements: they are the largest things there are while it is asked whether the cameras draw.
+        // Equations and factor are not kept for refinements: they are the largest things there are while it is asked
+        // whether the cameras draw.
         let solved = problem.solve(&mut MeshSolver::default(), plain_equations(&input, &problem))?;
         let warped = problem.warped(&solved);
         Ok(Self { input, layout, options, solved, warped })
     }
 
-    /// What the cameras draw, to be refined: the bases of `input` are the drawing, less the first vertex of the reference.
+    /// What the cameras draw, to be refined: the bases of `input` are the drawing, less the first vertex of the
+    /// reference.
     ///
-    /// The cameras have decided how the overlaps lie. The match points, which would bend the drawing to the mesh that was worse,
-    /// have no weight; what a refinement finds draws the overlaps together, while the outlines stay.
+    /// The cameras have decided how the overlaps lie. The match points, which would bend the drawing to the mesh that
+    /// was worse, have no weight; what a refinement finds draws the overlaps together, while the outlines stay.
     pub fn of_drawing(input: MeshInput<'a>, options: &'a MeshOptions, context: &StageContext) -> Self {
         let MeshInput { grids, bases, warps, .. } = input;
         let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
@@ -125,8 +127,8 @@ impl<'a> PlainMesh<'a> {
     }
 
     /// How much of the distance at which matched `points` land is common to neighbors, and so is no noise but parallax
-    /// that a refinement could take up: the mean over the points of the share of its weight that each would have, 0 to 1; 0 where noise
-    /// alone may have it.
+    /// that a refinement could take up: the mean over the points of the share of its weight that each would have, 0 to
+    /// 1; 0 where noise alone may have it.
     pub fn misaligned_share(&self, points: &[PairMatches]) -> f64 {
         let (solved, fine, places) = (&self.solved.meshes, &self.warped.meshes, &self.layout.places);
         line_alignment::misaligned_share(points, &CurrentGrids { solved, fine, places })

@@ -126,8 +126,8 @@ fn pixels_align_alike_on_any_number_of_threads() {
     assert_eq!(on(1), on(4));
 }
 
-/// The bump lies in a sixth of the overlap, and 3.6 px are more than is believed fully. A floor that recedes is apart by up to 1.4 px, and a thing that moved by 6, in a
-/// seventh of the overlap, while all else is where it was.
+/// The bump lies in a sixth of the overlap, and 3.6 px are more than is believed fully. A floor that recedes is apart
+/// by up to 1.4 px, and a thing that moved by 6, in a seventh of the overlap, while all else is where it was.
 #[test]
 fn parallax_is_told_from_noise_by_what_neighbors_share_and_from_things_that_moved() {
     let (grids, warps) = shifted();
@@ -163,7 +163,8 @@ fn without_refinements_the_plain_mesh_is_left_as_it_is() {
     assert_eq!(refined(&Refinements { outline_weight: 7.0, ..Refinements::default() }), plain);
 }
 
-/// The cameras draw the shift and nothing of the bump. Match points, which are 5 px off in both directions, have no weight.
+/// The cameras draw the shift and nothing of the bump. Match points, which are 5 px off in both directions, have no
+/// weight.
 #[test]
 fn what_the_cameras_draw_comes_together_between_its_outlines() {
     let (grids, mut warps) = shifted();

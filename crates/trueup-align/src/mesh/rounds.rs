@@ -59,8 +59,8 @@ impl MeshProblem<'_> {
     ) -> Result<(NormalEquations, Solved)> {
         /// Times the mesh is solved with lines and weights found on the solution before.
         const ROUNDS: usize = 4;
-        /// Distance at which a match has half its weight in the first round, panorama units: what is near the camera starts as far from where most
-        /// matches meet.
+        /// Distance at which a match has half its weight in the first round, panorama units: what is near the camera
+        /// starts as far from where most matches meet.
         const FIRST_ROBUST_PX: f64 = 30.0;
         /// Factor on the robust distance from round to round: where depth differs within a cell, the surface that most
         /// matches are on wins. The last round's distance is that of a match's own error, 1 px.

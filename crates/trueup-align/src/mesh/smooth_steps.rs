@@ -1,8 +1,8 @@
 //! Steps aside over whole photographs, as even as they can be while places that overlaps share come to meet.
 //!
-//! What overlaps ask of two photographs is how far apart they are, not which of them gives way, nor what their other parts
-//! do. A photograph that gives way in an overlap alone bends there, and lines with it. Here the freedom is spent on evenness:
-//! steps that grow evenly keep every straight line straight, and go on where a photograph is alone.
+//! What overlaps ask of two photographs is how far apart they are, not which of them gives way, nor what their other
+//! parts do. A photograph that gives way in an overlap alone bends there, and lines with it. Here the freedom is spent
+//! on evenness: steps that grow evenly keep every straight line straight, and go on where a photograph is alone.
 //!
 //! # Source
 //! F. L. Bookstein, "Principal warps: thin-plate splines and the decomposition of deformations" (1989), for the bending
@@ -31,28 +31,32 @@ pub(crate) struct Meeting {
     pub share: f64,
 }
 
-/// Cells of a lattice along a photograph's longer side for which the weights are; where there are fewer, and larger ones, second differences
-/// weigh as much less as they are larger, and so do leans.
+/// Cells of a lattice along a photograph's longer side for which the weights are; where there are fewer, and larger
+/// ones, second differences weigh as much less as they are larger, and so do leans.
 pub(crate) const LATTICE_CELLS: f64 = 16.0;
-/// Weight of the bending energy beside that of a meeting, per pixel of second difference from cell to cell of the lattice: what an overlap's
-/// difference changes within a cell or two is left to who draws overlaps together. Between 1 and 4 long lines of the facades that were looked at bend alike.
+/// Weight of the bending energy beside that of a meeting, per pixel of second difference from cell to cell of the
+/// lattice: what an overlap's difference changes within a cell or two is left to who draws overlaps together. Between 1
+/// and 4 long lines of the facades that were looked at bend alike.
 const BENDING: f64 = 2.0;
-/// Weight of every vertex's pull to where its camera sees it: felt within half a photograph of an overlap, where corrections so come to an end.
+/// Weight of every vertex's pull to where its camera sees it: felt within half a photograph of an overlap, where
+/// corrections so come to an end.
 const REST: f64 = 0.06;
-/// Weight of the lean of what is vertical, in pixels a cell, where photographs overlap: what is level may follow the neighbor's. Chosen on four
-/// photographed pairs: without it two stand askew by 0.3 and 0.5 degrees more; with 4 and more, lines bend as if photographs gave way in the overlap alone.
+/// Weight of the lean of what is vertical, in pixels a cell, where photographs overlap: what is level may follow the
+/// neighbor's. Chosen on four photographed pairs: without it two stand askew by 0.3 and 0.5 degrees more; with 4 and
+/// more, lines bend as if photographs gave way in the overlap alone.
 const LEAN: f64 = 1.0;
-/// The same where a photograph is alone, and nothing asks it to lean: corrections that would stand it askew end beside the overlap, and go on as a shift.
-/// Chosen on pair-school, whose verticals lean by 0.26 degrees with 8 in place of 0.63 with 1, while its long lines bend a tenth less; 15 and 30 gain little more.
+/// The same where a photograph is alone, and nothing asks it to lean: corrections that would stand it askew end beside
+/// the overlap, and go on as a shift. Chosen on pair-school, whose verticals lean by 0.26 degrees with 8 in place of
+/// 0.63 with 1, while its long lines bend a tenth less; 15 and 30 gain little more.
 const LEAN_ALONE: f64 = 8.0;
 /// Distance from the overlap at which a photograph is alone, in its longer sides.
 const ALONE: f64 = 0.15;
-/// Times the equations are solved; the photographs' maps into each other are linear to a hundredth of a pixel over the steps
-/// that are left after the first.
+/// Times the equations are solved; the photographs' maps into each other are linear to a hundredth of a pixel over the
+/// steps that are left after the first.
 const ROUNDS: usize = 2;
 
-/// By how many of its own pixels each vertex of every photograph's lattice steps aside: lattices with the steps as targets,
-/// bilinear between the vertices. `None` if there is nothing to step aside for.
+/// By how many of its own pixels each vertex of every photograph's lattice steps aside: lattices with the steps as
+/// targets, bilinear between the vertices. `None` if there is nothing to step aside for.
 ///
 /// `lattices` are even and undeformed, over the photographs in the pixels of `cameras`.
 pub(crate) fn smooth_steps(cameras: &[Camera], lattices: &[GridMesh], meetings: &[Meeting]) -> Option<Vec<GridMesh>> {
@@ -97,7 +101,8 @@ fn add_meeting(meeting: &Meeting, cameras: &[Camera], steps: &[GridMesh], equati
     });
 }
 
-/// How far every vertex of every lattice lies from the nearest one that meets another photograph, in the photograph's longer sides.
+/// How far every vertex of every lattice lies from the nearest one that meets another photograph, in the photograph's
+/// longer sides.
 fn asides(lattices: &[GridMesh], meetings: &[Meeting]) -> Vec<Vec<f64>> {
     let mut met: Vec<Vec<bool>> = lattices.iter().map(|lattice| vec![false; lattice.len()]).collect();
     meetings.iter().for_each(|meeting| met[meeting.from[0]][meeting.from[1]] = true);
@@ -115,7 +120,8 @@ fn asides(lattices: &[GridMesh], meetings: &[Meeting]) -> Vec<Vec<f64>> {
     lattices.iter().zip(&met).map(of_lattice).collect()
 }
 
-/// What keeps steps even and small, and what is upright upright; `asides` are those of [`asides`]. The cameras' world is the level one.
+/// What keeps steps even and small, and what is upright upright; `asides` are those of [`asides`]. The cameras' world
+/// is the level one.
 fn shape_energy(cameras: &[Camera], lattices: &[GridMesh], asides: &[Vec<f64>]) -> NormalEquations {
     let mut equations = NormalEquations::new(lattices);
     for (photograph, lattice) in lattices.iter().enumerate() {
@@ -154,15 +160,16 @@ fn shape_energy(cameras: &[Camera], lattices: &[GridMesh], asides: &[Vec<f64>]) 
     equations
 }
 
-/// How many times as large as usual a lattice's cells are, 1 where they are hardly larger: what is rounded to whole cells makes no difference.
+/// How many times as large as usual a lattice's cells are, 1 where they are hardly larger: what is rounded to whole
+/// cells makes no difference.
 fn coarseness(lattice: &GridMesh) -> f64 {
     const ROUNDING: f64 = 1.1;
     let coarseness = lattice.cell_width() * LATTICE_CELLS / lattice.width.max(lattice.height);
     if coarseness > ROUNDING { coarseness } else { 1.0 }
 }
 
-/// What keeps the scene's verticals as they stand: at every vertex, how far what lies a cell further down steps across the vertical
-/// beside it.
+/// What keeps the scene's verticals as they stand: at every vertex, how far what lies a cell further down steps across
+/// the vertical beside it.
 fn add_leans(photograph: usize, camera: &Camera, lattice: &GridMesh, asides: &[f64], equations: &mut NormalEquations) {
     let cell = [lattice.cell_width(), lattice.cell_height()];
     let coarseness = coarseness(lattice);
@@ -183,7 +190,8 @@ fn add_leans(photograph: usize, camera: &Camera, lattice: &GridMesh, asides: &[f
     }
 }
 
-/// The direction, of unit length, in which a pixel moves when what it shows moves down; `None` near a pole of the level world.
+/// The direction, of unit length, in which a pixel moves when what it shows moves down; `None` near a pole of the level
+/// world.
 fn down_at(camera: &Camera, pixel: Vector2<f64>) -> Option<Vector2<f64>> {
     /// Radians, and the sine of the angle to a pole (15 degrees) within which there is no vertical to speak of.
     const STEP: f64 = 1e-4;

@@ -7,8 +7,8 @@ use super::*;
 const FOCAL_PX: f64 = 700.0;
 const SIZE: [f64; 2] = [800.0, 600.0];
 
-/// Two level photographs 30 degrees apart, and meetings at every vertex of both whose place in the other lies `apart` pixels (as a
-/// function of the pixel, in the second photograph) from where the cameras have it.
+/// Two level photographs 30 degrees apart, and meetings at every vertex of both whose place in the other lies `apart`
+/// pixels (as a function of the pixel, in the second photograph) from where the cameras have it.
 fn pair(apart: impl Fn(Vector2<f64>) -> Vector2<f64>) -> (Vec<Camera>, Vec<GridMesh>, Vec<Meeting>) {
     pair_on_lattices(SIZE[0] / LATTICE_CELLS, apart)
 }
@@ -36,7 +36,8 @@ fn pair_on_lattices(
     (cameras, lattices, meetings)
 }
 
-/// Largest distance of the vertices of a row or column, after their steps, from the line through its ends, as a share of its length.
+/// Largest distance of the vertices of a row or column, after their steps, from the line through its ends, as a share
+/// of its length.
 fn largest_bend(steps: &GridMesh) -> f64 {
     let at = |row: usize, column: usize| {
         let vertex = row * steps.columns + column;
@@ -51,8 +52,9 @@ fn largest_bend(steps: &GridMesh) -> f64 {
     rows.chain(columns).fold(0.0, f64::max)
 }
 
-/// A facade that the second photographer saw from a step aside and farther: its places lie up to 6 pixels off, growing evenly.
-/// Overlaps meet, and no line of either photograph bends by more than 0.2 % of its length, as the steps fade beside the overlap.
+/// A facade that the second photographer saw from a step aside and farther: its places lie up to 6 pixels off, growing
+/// evenly. Overlaps meet, and no line of either photograph bends by more than 0.2 % of its length, as the steps fade
+/// beside the overlap.
 #[test]
 fn what_grows_evenly_bends_nothing() {
     let apart = |place: Vector2<f64>| Vector2::new(0.0, 0.015 * (place.x + 0.5 * place.y - 400.0));
@@ -75,8 +77,8 @@ fn what_grows_evenly_bends_nothing() {
     assert!(moved > 1.0, "{moved}");
 }
 
-/// The second photograph leans by half a degree against the first. Near its border a photograph leans most of the way, since the other one, which
-/// is alone just beyond, hardly does; where photographs are alone, verticals stand.
+/// The second photograph leans by half a degree against the first. Near its border a photograph leans most of the way,
+/// since the other one, which is alone just beyond, hardly does; where photographs are alone, verticals stand.
 #[test]
 fn what_leans_in_an_overlap_stands_beside_it() {
     let turn = 0.5_f64.to_radians();

@@ -17,7 +17,8 @@ pub(super) struct MeshSolution {
 /// Solves normal equations of the same grids again and again.
 ///
 /// The first are factorized. Those after them differ little, so that the factor at hand is a preconditioner with which
-/// conjugate gradients come near the same solution in a few steps; where they do not, the equations are factorized anew.
+/// conjugate gradients come near the same solution in a few steps; where they do not, the equations are factorized
+/// anew.
 #[derive(Debug)]
 pub(super) struct MeshSolver {
     /// The share of the way from the last solution that conjugate gradients may leave undone, where that is more than
@@ -49,11 +50,12 @@ impl Default for MeshSolver {
 impl MeshSolver {
     /// For equations that are made around each other's solutions: what one solution leaves undone, the next one sees.
     pub(super) fn of_rounds() -> Self {
-        /// The next round goes a tenth of the way of this one or more. Matches meet, and NCC MSE comes, to the same within 0.4 %
-        /// (eight photographed pairs and sets); with 0.05 one pair was 9 % off, with 0.1 three by 2 to 24 %.
+        /// The next round goes a tenth of the way of this one or more. Matches meet, and NCC MSE comes, to the same
+        /// within 0.4 % (eight photographed pairs and sets); with 0.05 one pair was 9 % off, with 0.1 three by 2 to 24
+        /// %.
         const UNMET_SHARE: f64 = 0.02;
-        // The factor is a preconditioner from the second round on at the latest. In single precision it is computed, and goes through memory, in half
-        // of the time.
+        // The factor is a preconditioner from the second round on at the latest. In single precision it is computed,
+        // and goes through memory, in half of the time.
         let factoring = Factoring { most_doubles: 0, goal: Goal { met_px: MET_PX, unmet_share: 0.0 } };
         Self { unmet_share: UNMET_SHARE, factoring, last: None }
     }
@@ -84,7 +86,8 @@ impl MeshSolver {
     }
 }
 
-/// The factor of the system and its solution, as near as it is to come where the factor is in single precision, else to rounding.
+/// The factor of the system and its solution, as near as it is to come where the factor is in single precision, else to
+/// rounding.
 fn solve_directly(system: &System, right: &Bordered, factoring: Factoring) -> Option<(Factor, Bordered)> {
     let Factoring { most_doubles, goal } = factoring;
     let vertices = right.inner.nrows() / 2;
@@ -197,8 +200,8 @@ impl Factor {
     }
 }
 
-/// What conjugate gradients leave undone: steps that would move no vertex by more than this, panorama units. Matches are
-/// known to a few tenths of a unit, and the next round starts from better equations.
+/// What conjugate gradients leave undone: steps that would move no vertex by more than this, panorama units. Matches
+/// are known to a few tenths of a unit, and the next round starts from better equations.
 const MET_PX: f64 = 1e-3;
 
 /// How near conjugate gradients are to come to the solution.
@@ -210,15 +213,15 @@ struct Goal {
     unmet_share: f64,
 }
 
-/// As near as a factor in double precision comes: steps of a hundred-millionth of a pixel, which on panoramas of a million units are in the last
-/// digits.
+/// As near as a factor in double precision comes: steps of a hundred-millionth of a pixel, which on panoramas of a
+/// million units are in the last digits.
 const TO_ROUNDING: Goal = Goal { met_px: 1e-8, unmet_share: 0.0 };
 
 /// The solution of `system` by conjugate gradients from `start`, preconditioned with the factor of a matrix like its
 /// own, but for what the `goal` leaves undone; `None` if that takes longer than a factorization.
 ///
-/// The preconditioned residual is what the factor's own matrix would still have to be moved by: it says in the unit of the
-/// unknowns how far the solution is.
+/// The preconditioned residual is what the factor's own matrix would still have to be moved by: it says in the unit of
+/// the unknowns how far the solution is.
 ///
 /// # Source
 /// M. R. Hestenes and E. Stiefel, "Methods of conjugate gradients for solving linear systems" (1952), with a
@@ -267,11 +270,13 @@ fn conjugate_gradients(
     None
 }
 
-/// Steps of conjugate gradients that take about half as long as a factorization, or less, whose columns have so many entries in the mean: a step goes
-/// twice through the entries, while computing them takes as many products for each as its column has.
+/// Steps of conjugate gradients that take about half as long as a factorization, or less, whose columns have so many
+/// entries in the mean: a step goes twice through the entries, while computing them takes as many products for each as
+/// its column has.
 fn most_steps(mean_column: f64) -> usize {
-    /// Entries of a column beyond which a factorization takes as long as two more steps. Of five photographs, whose columns have 410, it takes as long as 25
-    /// steps; of 72, whose columns have 1430, as 170, because large products leave what is slow, memory, alone.
+    /// Entries of a column beyond which a factorization takes as long as two more steps. Of five photographs, whose
+    /// columns have 410, it takes as long as 25 steps; of 72, whose columns have 1430, as 170, because large products
+    /// leave what is slow, memory, alone.
     const COLUMN_OF_A_STEP: f64 = 40.0;
     const FEWEST: f64 = 16.0;
     (mean_column / COLUMN_OF_A_STEP).max(FEWEST) as usize

@@ -8,15 +8,17 @@ use trueup_core::mesh::GridMesh;
 
 use crate::vanishing::FULL_WEIGHT_LENGTH_PX;
 
-/// Sine of the angle from straight up or down (20 degrees) within which nothing is seen to stand: plumb lines go all ways there, and a length of
-/// one reaches to the other side.
+/// Sine of the angle from straight up or down (20 degrees) within which nothing is seen to stand: plumb lines go all
+/// ways there, and a length of one reaches to the other side.
 const NEAR_PLUMB: f64 = 0.342_020_143_325_668_7;
 
-/// How far plumb lines of a photograph lean clockwise in the panorama, radians in [-pi, pi): the mean over `segments`, the upright ones of
-/// the photograph, in the pixels of `mesh` and `camera`, each weighed by its length as it votes for a direction.
+/// How far plumb lines of a photograph lean clockwise in the panorama, radians in [-pi, pi): the mean over `segments`,
+/// the upright ones of the photograph, in the pixels of `mesh` and `camera`, each weighed by its length as it votes for
+/// a direction.
 ///
-/// Not the segments lean, which are found with an error each, but plumb lines in their places and of their lengths, as `down`, the vertical in the
-/// camera's frame (a unit vector), has them. `None` where the panorama shows none of them but straight above and below.
+/// Not the segments lean, which are found with an error each, but plumb lines in their places and of their lengths, as
+/// `down`, the vertical in the camera's frame (a unit vector), has them. `None` where the panorama shows none of them
+/// but straight above and below.
 pub fn drawn_lean(mesh: &GridMesh, camera: &Camera, down: &Vector3<f64>, segments: &[LineSegment]) -> Option<f64> {
     let drawn = |segment: &LineSegment| {
         let middle = Vector2::from(segment.start).lerp(&segment.end.into(), 0.5);
@@ -71,8 +73,9 @@ mod tests {
         assert!((upper - 0.1_f64.atan()).abs() < 1e-3, "{upper}");
     }
 
-    /// The left half of the photograph stands upright, in the right half what points down is drawn to the left by a tenth. By hand: lines of 60 and 180 px,
-    /// which count for 120, in either: a third of nothing and two thirds of atan 0.1, as sums of unit vectors.
+    /// The left half of the photograph stands upright, in the right half what points down is drawn to the left by a
+    /// tenth. By hand: lines of 60 and 180 px, which count for 120, in either: a third of nothing and two thirds of
+    /// atan 0.1, as sums of unit vectors.
     #[test]
     fn what_leans_counts_where_upright_lines_are() {
         let mesh = sheared(|x| if x > 200.0 { 0.1 } else { 0.0 });
@@ -85,8 +88,8 @@ mod tests {
         assert!((lean(&[left, right]) - expected).abs() < 1e-12, "{}", lean(&[left, right]));
     }
 
-    /// A camera that looks up: plumb lines meet. By hand: with down = (0, cos p, -sin p), what is x to the right of the middle points by
-    /// (x sin p, f cos p) down, and so leans to the left by the arc tangent of x / f tan p.
+    /// A camera that looks up: plumb lines meet. By hand: with down = (0, cos p, -sin p), what is x to the right of the
+    /// middle points by (x sin p, f cos p) down, and so leans to the left by the arc tangent of x / f tan p.
     #[test]
     fn plumb_lines_of_a_raised_camera_meet() {
         let pitch = 0.2_f64;

@@ -2,8 +2,8 @@
 //!
 //! * Against the truth: [`mean_relative_turn`] (GDIC), [`Uprightness`], [`true_alignment`].
 //! * From the grids alone: [`local_distortion`] (LD), [`folded_cells`].
-//! * From grids, lines and matches, without truth: [`Straightness`], [`reprojection`]; [`drawn_lean`], for the verticals
-//!   that [`crate::similarity::estimated_rolls`] finds in place of the true ones.
+//! * From grids, lines and matches, without truth: [`Straightness`], [`reprojection`]; [`drawn_lean`], for the
+//!   verticals that [`crate::similarity::estimated_rolls`] finds in place of the true ones.
 //! * From the pixels of two photographs where both lie on the panorama: [`OverlapPixels::measure`].
 
 mod alignment;

@@ -17,14 +17,14 @@ pub(super) fn is_sound(mesh: &GridMesh, cell: [usize; 4]) -> bool {
     })
 }
 
-/// The number of cells of a grid that are folded: turned over, crossed, bent inwards or collapsed. Cells that are not there
-/// (NaN) are not folded.
+/// The number of cells of a grid that are folded: turned over, crossed, bent inwards or collapsed. Cells that are not
+/// there (NaN) are not folded.
 pub fn folded_cells(mesh: &GridMesh) -> usize {
     mesh.whole_cells().filter(|&cell| !is_sound(mesh, cell)).count()
 }
 
-/// The grid without the vertices (NaN) of its torn cells: around a pole, one that reaches over more than half of a `turn` of
-/// the panorama joins what lies a turn apart. Without a turn, the grid as it is.
+/// The grid without the vertices (NaN) of its torn cells: around a pole, one that reaches over more than half of a
+/// `turn` of the panorama joins what lies a turn apart. Without a turn, the grid as it is.
 pub fn without_torn_cells(mesh: &GridMesh, turn: Option<f64>) -> GridMesh {
     let mut whole = mesh.clone();
     let Some(turn) = turn else { return whole };
@@ -48,7 +48,8 @@ pub fn may_overlap(a: &GridMesh, b: &GridMesh, period: Option<f64>) -> bool {
     turns.into_iter().any(meet)
 }
 
-/// The deformed border of a photograph, a closed polygon without the vertices that are not defined, ready to be asked for many points.
+/// The deformed border of a photograph, a closed polygon without the vertices that are not defined, ready to be asked
+/// for many points.
 #[derive(Debug)]
 pub(super) struct Outline {
     ring: Vec<Vector2<f64>>,
@@ -154,8 +155,8 @@ mod tests {
         assert_eq!(folded_cells(&mesh), 3);
     }
 
-    /// Two columns of a grid of 5 x 5 cells lie a turn of 60 to the left: the five cells between them and the others are
-    /// torn, and with their twelve vertices their neighbors on both sides go, which leaves the outer columns.
+    /// Two columns of a grid of 5 x 5 cells lie a turn of 60 to the left: the five cells between them and the others
+    /// are torn, and with their twelve vertices their neighbors on both sides go, which leaves the outer columns.
     #[test]
     fn torn_cells_are_taken_away() {
         let mut mesh = GridMesh::regular(50.0, 50.0, 10.0);

@@ -29,9 +29,10 @@ pub struct MatchedPair<'a> {
     pub matches: Vec<PointMatch>,
 }
 
-/// Measures how far apart matched points land, each way from one to the other as long as it is in the photographs there: the root mean
-/// square of its lengths in the two. That counts a way across the stretched rows beside a sphere's pole as what it shows. `None` without a
-/// match that lies in unfolded places of both. On a full turn whose ends meet, distances are taken modulo its `period`.
+/// Measures how far apart matched points land, each way from one to the other as long as it is in the photographs
+/// there: the root mean square of its lengths in the two. That counts a way across the stretched rows beside a sphere's
+/// pole as what it shows. `None` without a match that lies in unfolded places of both. On a full turn whose ends meet,
+/// distances are taken modulo its `period`.
 pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reprojection> {
     let mut distances: Vec<f64> =
         pairs.iter().flat_map(|pair| match_distances(pair, period)).filter(|distance| distance.is_finite()).collect();
@@ -49,8 +50,8 @@ pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reproj
     })
 }
 
-/// How far apart each match of a pair lands, in the order of the matches, measured as by [`reprojection`]; not finite where
-/// that is no number.
+/// How far apart each match of a pair lands, in the order of the matches, measured as by [`reprojection`]; not finite
+/// where that is no number.
 pub fn match_distances(pair: &MatchedPair, period: Option<f64>) -> impl Iterator<Item = f64> {
     pair.matches.iter().zip(panorama_ways(pair, period)).map(move |(one, way)| {
         ((squared_length_in(pair.a, one.in_a.into(), way) + squared_length_in(pair.b, one.in_b.into(), way)) / 2.0)
@@ -58,7 +59,8 @@ pub fn match_distances(pair: &MatchedPair, period: Option<f64>) -> impl Iterator
     })
 }
 
-/// How far apart each match of a pair lands, in the order of the matches, in pixels of the panorama; not finite where that is no number.
+/// How far apart each match of a pair lands, in the order of the matches, in pixels of the panorama; not finite where
+/// that is no number.
 pub fn panorama_distances(pair: &MatchedPair, period: Option<f64>) -> impl Iterator<Item = f64> {
     panorama_ways(pair, period).map(|way| way.norm())
 }
@@ -74,7 +76,8 @@ fn panorama_ways(pair: &MatchedPair, period: Option<f64>) -> impl Iterator<Item 
 /// The share of the distances below the percentile, by its nearest rank.
 const PERCENTILE: f64 = 0.95;
 
-/// The square of a panorama way's length in the photograph, by what the grid does around a point; NaN where it is folded.
+/// The square of a panorama way's length in the photograph, by what the grid does around a point; NaN where it is
+/// folded.
 fn squared_length_in(mesh: &GridMesh, point: Vector2<f64>, way: Vector2<f64>) -> f64 {
     let derivative = mesh.derivative(point);
     let unfolded = (derivative.determinant() > 0.0).then(|| derivative.try_inverse()).flatten();
@@ -102,7 +105,8 @@ mod tests {
         assert!((found.percentile_95_px - 19.0).abs() < 1e-9);
     }
 
-    /// x to x^2 / 100, y kept: at x = 24.5 ways along x are twice as long in the photograph (1 / 0.49), at x = 75 two thirds; across, as long.
+    /// x to x^2 / 100, y kept: at x = 24.5 ways along x are twice as long in the photograph (1 / 0.49), at x = 75 two
+    /// thirds; across, as long.
     #[test]
     fn a_way_is_as_long_as_in_the_photograph() {
         let mut mesh = GridMesh::regular(100.0, 100.0, 1.0);

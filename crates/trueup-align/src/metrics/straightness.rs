@@ -27,12 +27,12 @@ pub struct Straightness {
 }
 
 impl Straightness {
-    /// Carries a straight line of the scene to the panorama point by point, `step_px` apart at most and at least three, and
-    /// measures their distances from the straight line that fits them best (total least squares). `None` if that is no line:
-    /// no length, or not finite anywhere, as where a projection has no place for a part of it.
+    /// Carries a straight line of the scene to the panorama point by point, `step_px` apart at most and at least three,
+    /// and measures their distances from the straight line that fits them best (total least squares). `None` if that is
+    /// no line: no length, or not finite anywhere, as where a projection has no place for a part of it.
     ///
-    /// `line` has the ends of the line in the photograph, in the pixels of `camera`, over which `mesh` lies. Behind a lens that
-    /// bends, what is straight between them in the scene is a curve in the photograph, and that is carried.
+    /// `line` has the ends of the line in the photograph, in the pixels of `camera`, over which `mesh` lies. Behind a
+    /// lens that bends, what is straight between them in the scene is a curve in the photograph, and that is carried.
     pub fn of(line: &LineSegment, camera: &Camera, mesh: &GridMesh, step_px: f64) -> Option<Self> {
         // The cast saturates, and a length that is not finite or a step of 0 is refused below.
         let steps = ((line.length() / step_px).ceil() as usize).clamp(2, MAX_STEPS);
@@ -118,7 +118,8 @@ mod tests {
         assert!(!Straightness::of(&line(300.0), &camera(), &hardly, 0.5).expect("a line").is_bent());
     }
 
-    /// A barrel of -3 % at the corners, drawn without its bend: what is straight in the scene is, however it curves in the photograph.
+    /// A barrel of -3 % at the corners, drawn without its bend: what is straight in the scene is, however it curves in
+    /// the photograph.
     #[test]
     fn behind_a_lens_a_straight_line_is_a_curve() {
         let lens = LensTerms { radial: [-0.1, 0.0, 0.0, 0.0], ..LensTerms::default() };

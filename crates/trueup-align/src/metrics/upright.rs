@@ -6,8 +6,8 @@ use trueup_core::mesh::GridMesh;
 /// Signed angles of photographs to upright, in radians, and what they come to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uprightness {
-    /// By how much each photograph is turned too far clockwise, in [-pi, pi); NaN where its middle is not shown, and such
-    /// count for nothing.
+    /// By how much each photograph is turned too far clockwise, in [-pi, pi); NaN where its middle is not shown, and
+    /// such count for nothing.
     pub photographs: Vec<f64>,
     /// Mean of the absolute values.
     pub mean: f64,
@@ -42,8 +42,8 @@ impl Uprightness {
     }
 }
 
-/// Expected absolute value of an angle that is known to be `mean`, with the standard error `deviation`, in the same unit:
-/// the mean of the folded normal distribution.
+/// Expected absolute value of an angle that is known to be `mean`, with the standard error `deviation`, in the same
+/// unit: the mean of the folded normal distribution.
 ///
 /// # Source
 /// Leone, Nelson and Nottingham, "The folded normal distribution", Technometrics 3, 1961.
@@ -91,7 +91,8 @@ mod tests {
         assert!((uprightness.spread.to_degrees() - 2.0).abs() < 2e-3);
     }
 
-    /// E|N(0, 1)| is the root of 2 / pi; E|N(1, 1)| is 1.16663 (Leone and others, table 1); far from zero it is the mean.
+    /// E|N(0, 1)| is the root of 2 / pi; E|N(1, 1)| is 1.16663 (Leone and others, table 1); far from zero it is the
+    /// mean.
     #[test]
     fn an_uncertain_angle_is_expected_to_be_larger() {
         for (mean, deviation, expected) in [(0.0, 1.0, 0.797_884_6), (1.0, 1.0, 1.166_63), (-1.0, 1.0, 1.166_63)] {

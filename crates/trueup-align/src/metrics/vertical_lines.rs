@@ -39,11 +39,11 @@ pub fn vertical_segments(photograph: &VerticalLinesInput) -> Vec<usize> {
     pointing_down(&planes, &down)
 }
 
-/// Which of a photograph's segments carry a vertical that is known, by their positions in `photograph.lines`, ascending: those within 1.5 degrees
-/// of `photograph.expected_down`.
+/// Which of a photograph's segments carry a vertical that is known, by their positions in `photograph.lines`,
+/// ascending: those within 1.5 degrees of `photograph.expected_down`.
 ///
-/// Empty if there are fewer than three, or no more than segments of any direction would show by chance, at 99 %; and where there is no upright,
-/// as for [`vertical_segments`].
+/// Empty if there are fewer than three, or no more than segments of any direction would show by chance, at 99 %; and
+/// where there is no upright, as for [`vertical_segments`].
 pub fn carrying_segments(photograph: &VerticalLinesInput) -> Vec<usize> {
     let Some(down) = photograph.expected_down.try_normalize(f64::MIN_POSITIVE) else { return Vec::new() };
     let planes = InterpretationPlanes::new(photograph.lines, photograph.camera, photograph.frame);
@@ -51,7 +51,8 @@ pub fn carrying_segments(photograph: &VerticalLinesInput) -> Vec<usize> {
     if segments.len() >= fewest_carrying(planes.len()) { segments } else { Vec::new() }
 }
 
-/// How many of so many segments must point to the vertical: three, and more than chance lets of segments that point anywhere, at 99 %.
+/// How many of so many segments must point to the vertical: three, and more than chance lets of segments that point
+/// anywhere, at 99 %.
 fn fewest_carrying(segments: usize) -> usize {
     /// As many make a direction elsewhere, too; two cross in one whatever they are.
     const LEAST: usize = 3;
@@ -73,9 +74,9 @@ fn pointing_down(planes: &InterpretationPlanes, down: &Vector3<f64>) -> Vec<usiz
     segments
 }
 
-/// Which of three directions each of a photograph's segments points to: the nearest of `directions` (in the camera's frame, of
-/// unit length), within 1.5 degrees of the segment's interpretation plane. An entry for every segment of `lines`, which are
-/// in the working pixels of `camera`; `None` where it points to none of them.
+/// Which of three directions each of a photograph's segments points to: the nearest of `directions` (in the camera's
+/// frame, of unit length), within 1.5 degrees of the segment's interpretation plane. An entry for every segment of
+/// `lines`, which are in the working pixels of `camera`; `None` where it points to none of them.
 pub fn directions_of_segments(
     lines: &[LineSegment],
     camera: &Camera,
@@ -176,7 +177,8 @@ mod tests {
         assert!(found(&lines, Vector3::z()).is_empty(), "looks straight down");
     }
 
-    /// By hand: of 20 segments a sixtieth, 0.33, plus 2.33 deviations of 0.57 are 1.67, so that the least counts; of 400, 6.67 plus 2.33 x 2.56 are 12.6.
+    /// By hand: of 20 segments a sixtieth, 0.33, plus 2.33 deviations of 0.57 are 1.67, so that the least counts; of
+    /// 400, 6.67 plus 2.33 x 2.56 are 12.6.
     #[test]
     fn what_chance_shows_carries_no_vertical() {
         assert_eq!([0, 20, 400].map(fewest_carrying), [3, 3, 13]);
@@ -193,8 +195,8 @@ mod tests {
         assert!(carrying(&lines, Vector3::z()).is_empty() && carrying(&lines, Vector3::zeros()).is_empty());
     }
 
-    /// A camera of focal length 100 px that looks along z: an upright segment points to y, one that runs to the middle to z,
-    /// one aslant beside it to none, and a point nowhere.
+    /// A camera of focal length 100 px that looks along z: an upright segment points to y, one that runs to the middle
+    /// to z, one aslant beside it to none, and a point nowhere.
     #[test]
     fn segments_point_to_the_nearest_direction_or_to_none() {
         let camera = Camera::new(100.0, 200.0, 100.0, &Matrix3::identity());

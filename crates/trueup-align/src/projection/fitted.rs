@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 
 /// Which of the family. Verticals are straight in all of them, and upright.
 ///
-/// A direction of longitude l and latitude p (down) lies at x = s sin l and, before heights are compressed, at y = s tan p.
-/// Up to `round` = 1, s = (d + 1) / (d + cos l) with d = `round`: Panini's projection of that distance, of which 0 is the
-/// plane. Beyond, x = tan(k l) / k and y = tan p cos(k l)^(-1/k) with k = 1 - `round` / 2, which for k = 1/2 is Panini's of
-/// distance 1 and for k = 0 the cylinder. Then y becomes tan(u atan y) / u with u = `upright`: itself for 1, and for 0, on the
-/// cylinder, the latitude.
+/// A direction of longitude l and latitude p (down) lies at x = s sin l and, before heights are compressed, at y = s
+/// tan p. Up to `round` = 1, s = (d + 1) / (d + cos l) with d = `round`: Panini's projection of that distance, of which
+/// 0 is the plane. Beyond, x = tan(k l) / k and y = tan p cos(k l)^(-1/k) with k = 1 - `round` / 2, which for k = 1/2
+/// is Panini's of distance 1 and for k = 0 the cylinder. Then y becomes tan(u atan y) / u with u = `upright`: itself
+/// for 1, and for 0, on the cylinder, the latitude.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// From the plane (0) over Panini's projection (1) to the cylinder (2).
@@ -51,8 +51,8 @@ impl Fit {
         Some(Vector2::new(column.x, if self.upright == 1.0 { tangent } else { y }))
     }
 
-    /// Whether the projection shows all longitudes and ends behind the viewer: what lies there on both sides of the cut, at half a turn, is as far
-    /// apart on the plane as can be.
+    /// Whether the projection shows all longitudes and ends behind the viewer: what lies there on both sides of the
+    /// cut, at half a turn, is as far apart on the plane as can be.
     pub(super) fn is_cut_behind(&self) -> bool {
         self.turn_share() < 0.5
     }
@@ -139,7 +139,8 @@ mod tests {
     #[test]
     fn a_turned_one_keeps_horizontals() {
         let fit = Fit { round: 2.0, upright: 1.0, turned: true };
-        // A horizontal line in front, one high: y is its elevation wherever it goes, and x its distance over the radius.
+        // A horizontal line in front, one high: y is its elevation wherever it goes, and x its distance over the
+        // radius.
         for x in [-0.7, 0.0, 1.3] {
             let place = fit.place(&Vector3::new(x, 1.0, 1.0).normalize()).expect("shown");
             assert!((place - Vector2::new(x / 2_f64.sqrt(), PI / 4.0)).norm() < 1e-12, "{place}");

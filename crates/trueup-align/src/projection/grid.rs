@@ -38,10 +38,11 @@ pub struct PlacedGrid {
 const LARGEST_SAG_PX: f64 = 0.3;
 /// Radians beyond the view's end that are drawn: whole cells lie across its border then.
 const MARGIN: f64 = 0.09;
-/// Photograph pixels that a cell across the cut of a view may be long: it is not drawn, so much of the view's end is missing.
+/// Photograph pixels that a cell across the cut of a view may be long: it is not drawn, so much of the view's end is
+/// missing.
 const ACROSS_CUT_PX: f64 = 4.0;
-/// Radians of longitude. A cell with a wider side may go round a pole: of the four sides of one that does, the widest is a quarter of the turn or
-/// more. Such a cell lies in no sector and leaves a hole of its size.
+/// Radians of longitude. A cell with a wider side may go round a pole: of the four sides of one that does, the widest
+/// is a quarter of the turn or more. Such a cell lies in no sector and leaves a hole of its size.
 const WIDEST: f64 = 0.45 * PI;
 
 /// Places every photograph's grid.
@@ -259,8 +260,9 @@ impl<'a> Drawing<'a> {
         grids
     }
 
-    /// Which vertices are drawn to the right, and which to the left of the middle, where a view does not close and the photograph reaches beyond both
-    /// of its ends; `None` where it does not. Cells narrower than [`WIDEST`] are whole on a side, those across the cut on none.
+    /// Which vertices are drawn to the right, and which to the left of the middle, where a view does not close and the
+    /// photograph reaches beyond both of its ends; `None` where it does not. Cells narrower than [`WIDEST`] are whole
+    /// on a side, those across the cut on none.
     fn sides_of_cut(&self, lines: &GridLines) -> Option<[Vec<bool>; 2]> {
         let columns = lines.columns.len();
         let longitude = |vertex: usize| self.longitude_from_cut(self.pixel(lines, vertex / columns, vertex % columns));
@@ -377,8 +379,8 @@ mod tests {
         assert!(grids.iter().all(|grid| grid.mesh.len() < 60_000), "{}", grids[0].mesh.len());
     }
 
-    /// Wherever the pole lies in its cell, and in the photograph: toward a corner, cells are no squares on the sphere, and those beside
-    /// the pole may take more than a quarter of the turn.
+    /// Wherever the pole lies in its cell, and in the photograph: toward a corner, cells are no squares on the sphere,
+    /// and those beside the pole may take more than a quarter of the turn.
     #[test]
     fn cells_beside_a_pole_lie_in_one_sector() {
         let view = view(FlatKind::Equirectangular);
@@ -398,8 +400,8 @@ mod tests {
         }
     }
 
-    /// A square of 0.6 px with the zenith in its middle, whose sides are a quarter of the turn each: smaller than what sags, but a hole as
-    /// long as it is one cell.
+    /// A square of 0.6 px with the zenith in its middle, whose sides are a quarter of the turn each: smaller than what
+    /// sags, but a hole as long as it is one cell.
     #[test]
     fn a_cell_around_a_pole_is_divided() {
         let (view, sky) = (view(FlatKind::Equirectangular), photograph(0.0, 90.0));
@@ -437,8 +439,9 @@ mod tests {
         }
     }
 
-    /// Photographs of what is behind and of the zenith, on a view that ends at half a turn: cells across its end were divided to the sixteenth of
-    /// a pixel, millions of them, and drawn all over the view. What lies near the end, up to four pixels of the photograph, is there, on both sides.
+    /// Photographs of what is behind and of the zenith, on a view that ends at half a turn: cells across its end were
+    /// divided to the sixteenth of a pixel, millions of them, and drawn all over the view. What lies near the end, up
+    /// to four pixels of the photograph, is there, on both sides.
     #[test]
     fn a_view_that_does_not_close_is_cut_behind() {
         for (turned, yaw_deg, pitch_deg) in [(false, 180.0, 70.0), (false, 10.0, 87.0), (true, 180.0, 3.0)] {

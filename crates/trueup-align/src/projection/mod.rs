@@ -2,8 +2,8 @@
 //!
 //! * [`flat`](Flat): each projection as a map between directions and a plane;
 //! * [`ProjectionView`]: where the viewer looks, how much is shown, and which projection suits;
-//! * [`place`]: every photograph's grid on the plane, as it is drawn, where it gives way ([`ParallaxShift`]) if it has to; [`place_once`]: as it
-//!   is measured and recorded.
+//! * [`place`]: every photograph's grid on the plane, as it is drawn, where it gives way ([`ParallaxShift`]) if it has
+//!   to; [`place_once`]: as it is measured and recorded.
 //!
 //! Directions are in the level world: x right, y down, z forward.
 

@@ -11,18 +11,19 @@ use super::grid::Placement;
 use super::parallax_shift::ParallaxShift;
 use super::photograph::PosedPhotograph;
 
-/// Largest distance of the middle of a cell's side from the true map, in canvas pixels, that even division is to reach. A
-/// tenth of a pixel is what matches are good for.
+/// Largest distance of the middle of a cell's side from the true map, in canvas pixels, that even division is to reach.
+/// A tenth of a pixel is what matches are good for.
 const LARGEST_SAG_PX: f64 = 0.1;
 /// The finest division of a cell of the solved mesh.
 const FINEST: usize = 4;
 
 /// Places every photograph of the view as one even grid on the plane, in the order given.
 ///
-/// Other than the grids of [`super::place`], which are drawn, each is whole: a photograph across the cut of a turn goes on
-/// beyond the end of the plane, one that shows a pole is torn behind its middle (cells wider than a quarter turn), and what
-/// lies beyond the view's end has its place as far as the projection goes. Vertices that have none are NaN. Cells are those
-/// of the solved mesh, divided evenly until they are within a tenth of a pixel of the true map, but into 4 x 4 at most.
+/// Other than the grids of [`super::place`], which are drawn, each is whole: a photograph across the cut of a turn goes
+/// on beyond the end of the plane, one that shows a pole is torn behind its middle (cells wider than a quarter turn),
+/// and what lies beyond the view's end has its place as far as the projection goes. Vertices that have none are NaN.
+/// Cells are those of the solved mesh, divided evenly until they are within a tenth of a pixel of the true map, but
+/// into 4 x 4 at most.
 pub fn place_once(
     photographs: &[PosedPhotograph],
     shifts: &[ParallaxShift],
@@ -77,8 +78,8 @@ impl Once<'_> {
         if division == 1 { coarse } else { self.even(division) }
     }
 
-    /// The largest distance of the middle of a cell's diagonal from the true map, on the plane; cells that are torn or not
-    /// whole aside.
+    /// The largest distance of the middle of a cell's diagonal from the true map, on the plane; cells that are torn or
+    /// not whole aside.
     fn sag(&self, mesh: &GridMesh) -> f64 {
         mesh.whole_cells()
             .filter_map(|[first, _, last, _]| {
@@ -116,8 +117,8 @@ mod tests {
         place_once(std::slice::from_ref(photograph), &[shift], &placement).remove(0)
     }
 
-    /// The corner of a photograph that looks 25 degrees to the right is (400, 300, 700) for its camera, and on the plane
-    /// where the tangents of the two turns say.
+    /// The corner of a photograph that looks 25 degrees to the right is (400, 300, 700) for its camera, and on the
+    /// plane where the tangents of the two turns say.
     #[test]
     fn vertices_lie_where_the_projection_has_them() {
         let mesh = placed(&photograph(25.0, 0.0), FlatKind::Perspective);

@@ -7,9 +7,9 @@ use super::flat::FlatKind;
 trueup_core::choice! {
     /// What the panorama is drawn on.
     pub enum Projection {
-        /// The view a person would choose: as straight as it can be without stretching. Perspective up to about 95 degrees,
-        /// from there ever more like Panini's and the cylinder, and equirectangular for full turns. For vpg; other methods
-        /// keep their mesh.
+        /// The view a person would choose: as straight as it can be without stretching. Perspective up to about 95
+        /// degrees, from there ever more like Panini's and the cylinder, and equirectangular for full turns. For vpg;
+        /// other methods keep their mesh.
         Auto = "auto",
         /// The solved mesh itself: every photograph as natural as its neighbors allow.
         Mesh = "mesh",

@@ -1,12 +1,13 @@
 //! The view that suits: the straightest of a family of projections that stretches nothing beyond a limit.
 //!
 //! # Source
-//! R. Carroll, M. Agrawala and A. Agarwala, "Optimizing content-preserving projections for wide-angle images" (2009): what
-//! people want of a wide view is that lines stay straight and shapes are kept, which no projection does, and that the
-//! compromise changes smoothly. Theirs is a mesh for every picture, under lines that the user marks; ours is the one of
-//! [`Flat`]'s family in which verticals are always straight that bends the others least within a limit on shapes, so that
-//! nothing has to be marked and one more photograph changes the view a little, not its kind. T. K. Sharpless, B. Postle
-//! and D. M. German, "Pannini: a new projection for rendering wide angle perspective images" (2010): the family's middle.
+//! R. Carroll, M. Agrawala and A. Agarwala, "Optimizing content-preserving projections for wide-angle images" (2009):
+//! what people want of a wide view is that lines stay straight and shapes are kept, which no projection does, and that
+//! the compromise changes smoothly. Theirs is a mesh for every picture, under lines that the user marks; ours is the
+//! one of [`Flat`]'s family in which verticals are always straight that bends the others least within a limit on
+//! shapes, so that nothing has to be marked and one more photograph changes the view a little, not its kind. T. K.
+//! Sharpless, B. Postle and D. M. German, "Pannini: a new projection for rendering wide angle perspective images"
+//! (2010): the family's middle.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -18,25 +19,28 @@ use super::fitted::Fit;
 use super::flat::Flat;
 use super::photograph::PosedPhotograph;
 
-/// How much longer than wide, or wider than long, something may be drawn: what a wide lens does to faces 48 degrees from
-/// its middle, which people accept at the sides of a picture of about 95 degrees and not beyond.
+/// How much longer than wide, or wider than long, something may be drawn: what a wide lens does to faces 48 degrees
+/// from its middle, which people accept at the sides of a picture of about 95 degrees and not beyond.
 const LARGEST_RATIO: f64 = 1.5;
-/// How much larger than in the middle something may be drawn, as a length: what a plane does where it has that ratio, the
-/// ratio to the power of 3/2.
+/// How much larger than in the middle something may be drawn, as a length: what a plane does where it has that ratio,
+/// the ratio to the power of 3/2.
 const LARGEST_SIZE: f64 = 1.84;
 /// How much more of both than on the cylinder, where these are larger already: far up and down. Sizes again to 3/2.
 const MORE_RATIO: f64 = 1.2;
 const MORE_SIZE: f64 = 1.31;
 /// Share of the photographs' pixels that may be stretched beyond these: corners.
 const BEYOND: f64 = 0.03;
-/// Sizes beyond which a view by itself shows nothing more: as for the named projections, about three times the middle's.
+/// Sizes beyond which a view by itself shows nothing more: as for the named projections, about three times the
+/// middle's.
 const SHOWN_SIZE: f64 = 3.0;
-/// How much longer than wide a view by itself shows anything: beside a pole, 75 degrees up and more, what is drawn on a cylinder becomes streaks.
+/// How much longer than wide a view by itself shows anything: beside a pole, 75 degrees up and more, what is drawn on a
+/// cylinder becomes streaks.
 const SHOWN_RATIO: f64 = 4.0;
 /// Half angles, radians (80 and 180 degrees), between which sizes have to grow more and more even: what lies behind the
 /// viewer is not the side of a view, and a turn whose ends meet must be even.
 const EVENING: [f64; 2] = [1.396, PI];
-/// Half angles, radians (120 and 180 degrees), between which heights go over to those of the sphere, which full turns have.
+/// Half angles, radians (120 and 180 degrees), between which heights go over to those of the sphere, which full turns
+/// have.
 const ROUNDING: [f64; 2] = [2.094, PI];
 /// Pixels looked at along each side of a photograph.
 const SAMPLES: usize = 17;
@@ -114,8 +118,8 @@ impl Seen {
         fit((first - 1) as f64 + share)
     }
 
-    /// What each direction may be stretched to: all, or more than the family's `cylinder` does to its height, where that is
-    /// more. With a `share` of it only: 1 for views, 0 for turns, which are to be as even as the cylinder.
+    /// What each direction may be stretched to: all, or more than the family's `cylinder` does to its height, where
+    /// that is more. With a `share` of it only: 1 for views, 0 for turns, which are to be as even as the cylinder.
     fn limits(&self, cylinder: &Flat, share: f64) -> Vec<Stretch> {
         let part = |limit: f64| 1.0 + (limit - 1.0) * share;
         let limits = self.directions.par_iter().with_min_len(PER_TASK).map(|direction| {
@@ -189,8 +193,8 @@ fn quantile(mut values: Vec<f64>) -> f64 {
 }
 
 /// Which share of latitudes the tangent is taken of, see [`super::fitted::Fit`], so that in the middle column what lies
-/// `height` radians from the horizon keeps the limits: 1, a plane's and a cylinder's heights, up to 48 degrees, 0, the sphere's
-/// own, from 73 degrees on, where widths alone are too large.
+/// `height` radians from the horizon keeps the limits: 1, a plane's and a cylinder's heights, up to 48 degrees, 0, the
+/// sphere's own, from 73 degrees on, where widths alone are too large.
 fn upright_height(height: f64) -> f64 {
     let wider = 1.0 / height.min(FRAC_PI_2).cos().max(f64::MIN_POSITIVE);
     let stretched = (LARGEST_SIZE.powi(2) / wider).min(LARGEST_RATIO * wider);

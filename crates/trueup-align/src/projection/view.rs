@@ -32,30 +32,33 @@ pub struct ProjectionView {
     pub closed: bool,
 }
 
-/// Mean pitches, radians (35 and 50 degrees), between which photographs that look one way come to be shown looking there:
-/// drawn level, they would be stretched beyond recognition.
+/// Mean pitches, radians (35 and 50 degrees), between which photographs that look one way come to be shown looking
+/// there: drawn level, they would be stretched beyond recognition.
 const STEEP: [f64; 2] = [0.611, 0.873];
-/// Lengths of the mean viewing direction between which photographs come to look one way: those that look all round have no
-/// common pitch.
+/// Lengths of the mean viewing direction between which photographs come to look one way: those that look all round have
+/// no common pitch.
 const ONE_WAY: [f64; 2] = [0.4, 0.6];
-/// Root mean squares, radians (17 and 24 degrees), of how much verticals would lean in the middles of photographs that are looked at steeply, between
-/// which they come to be drawn level all the same: side by side they are a panorama, and looked at a fan.
+/// Root mean squares, radians (17 and 24 degrees), of how much verticals would lean in the middles of photographs that
+/// are looked at steeply, between which they come to be drawn level all the same: side by side they are a panorama, and
+/// looked at a fan.
 const FANNED: [f64; 2] = [0.297, 0.419];
-/// Angles from the horizon, radians (70 and 80 degrees), between which what photographs reach is too steep for being drawn level.
+/// Angles from the horizon, radians (70 and 80 degrees), between which what photographs reach is too steep for being
+/// drawn level.
 const TOO_STEEP: [f64; 2] = [1.222, 1.396];
-/// Half angle, radians (50 degrees), within which the whole view must lie to be turned towards a facade, and by how much
-/// beyond it the turn ends (10 degrees).
+/// Half angle, radians (50 degrees), within which the whole view must lie to be turned towards a facade, and by how
+/// much beyond it the turn ends (10 degrees).
 const FACED: f64 = 0.873;
 const FACED_FADE: f64 = 0.175;
-/// A column of photographs is seen within so much to both sides (45 degrees), and from top to bottom over more than a plane
-/// carries without stretching (95 degrees). Its middle is near the horizon (20 degrees), so that what is vertical hardly
-/// leans in it, or it reaches so high or low (75 degrees) that no level view is of use.
+/// A column of photographs is seen within so much to both sides (45 degrees), and from top to bottom over more than a
+/// plane carries without stretching (95 degrees). Its middle is near the horizon (20 degrees), so that what is vertical
+/// hardly leans in it, or it reaches so high or low (75 degrees) that no level view is of use.
 const COLUMN_SIDE: f64 = 0.785;
 const COLUMN_LENGTH: f64 = 1.66;
 const COLUMN_MIDDLE: f64 = 0.349;
 const COLUMN_HEIGHT: f64 = 1.309;
-/// Angles from the horizon, radians (55 and 80 degrees), between which what a column reaches comes to lie so near to a pole that its longitudes say
-/// nothing of the column's middle: a corner 80 degrees up lies six times as far aside as it is wide.
+/// Angles from the horizon, radians (55 and 80 degrees), between which what a column reaches comes to lie so near to a
+/// pole that its longitudes say nothing of the column's middle: a corner 80 degrees up lies six times as far aside as
+/// it is wide.
 const NEAR_POLE: [f64; 2] = [0.960, 1.396];
 
 impl ProjectionView {
@@ -144,7 +147,8 @@ impl ProjectionView {
             && (middle.abs() < COLUMN_MIDDLE || level.height() > COLUMN_HEIGHT)
             && level.turned().height() < COLUMN_SIDE;
         let (view, seen) = if is_column {
-            // Beside the plane that it is looked at along, what is vertical converges: that plane goes through where its photographs look.
+            // Beside the plane that it is looked at along, what is vertical converges: that plane goes through where
+            // its photographs look.
             let aside = smooth(coverage.steepest(), NEAR_POLE);
             looking(straight + aside * wrap_angle(coverage.forward_longitude() - straight), middle)
         } else if steep == 0.0 {
@@ -207,9 +211,9 @@ fn named_kind(projection: Projection) -> Option<FlatKind> {
     }
 }
 
-/// Whether the panorama is one for viewers of spherical panoramas: photographs all around, and no narrower view asked for.
-/// Photographs that look one way and show a pole have all longitudes, too, and do not go round, unless they show the horizon all around: those of
-/// a drone look down in the mean, and around as well.
+/// Whether the panorama is one for viewers of spherical panoramas: photographs all around, and no narrower view asked
+/// for. Photographs that look one way and show a pole have all longitudes, too, and do not go round, unless they show
+/// the horizon all around: those of a drone look down in the mean, and around as well.
 fn goes_round(coverage: &SphereCoverage, options: &ProjectionOptions) -> bool {
     let is_wanted = options.fov == 0.0 || options.fov >= 360.0;
     let looks_at_a_pole = coverage.shows_a_pole() && smooth(coverage.forward.norm(), ONE_WAY) >= 0.5;
@@ -222,7 +226,8 @@ fn mean_pitch(coverage: &SphereCoverage) -> f64 {
     (-forward.y).atan2(forward.x.hypot(forward.z))
 }
 
-/// How much of the way up photographs are looked at that look one way and steeply: 0 where they are drawn level, 1 all of it.
+/// How much of the way up photographs are looked at that look one way and steeply: 0 where they are drawn level, 1 all
+/// of it.
 fn share_looked_at(coverage: &SphereCoverage) -> f64 {
     smooth(mean_pitch(coverage).abs(), STEEP) * smooth(coverage.forward.norm(), ONE_WAY)
 }
@@ -230,8 +235,8 @@ fn share_looked_at(coverage: &SphereCoverage) -> f64 {
 /// How much photographs that are looked at steeply would be a fan that can be drawn level: 0 not at all, 1 wholly.
 ///
 /// # Source
-/// What lies a longitude aside of the middle of a conic projection leans by that times the sine of the latitude that touches the cone
-/// (J. P. Snyder, "Map projections: a working manual" (1987), section 14).
+/// What lies a longitude aside of the middle of a conic projection leans by that times the sine of the latitude that
+/// touches the cone (J. P. Snyder, "Map projections: a working manual" (1987), section 14).
 fn fanned(photographs: &[PosedPhotograph], coverage: &SphereCoverage) -> f64 {
     let middle = coverage.forward_longitude();
     let aside = |photograph: &PosedPhotograph| {

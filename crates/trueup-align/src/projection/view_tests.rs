@@ -65,7 +65,8 @@ fn one_more_photograph_does_not_flip_the_view() {
     assert!(before.round > 1.8 && before.upright < 0.2, "{before:?}");
 }
 
-/// Up a tower, held upright: the highest of four photographs is turned aside by 6 degrees, and its corners alone are the ends of what is covered.
+/// Up a tower, held upright: the highest of four photographs is turned aside by 6 degrees, and its corners alone are
+/// the ends of what is covered.
 #[test]
 fn a_column_is_looked_at_where_its_photographs_look() {
     let held_upright = |(yaw, pitch)| PosedPhotograph {
@@ -145,7 +146,8 @@ fn photographs_of_a_ceiling_are_looked_up_at() {
     assert!(ProjectionView::choose(&row(2, 30.0), None, &options).pitch == 0.0);
 }
 
-/// Looked at, a wide row that looks up is a fan: it is drawn level as a whole turn of it is. Near the zenith nothing can be.
+/// Looked at, a wide row that looks up is a fan: it is drawn level as a whole turn of it is. Near the zenith nothing
+/// can be.
 #[test]
 fn a_wide_row_that_looks_up_is_drawn_level() {
     let pitch = |count: u32, pitch_deg: f64| view(&row(count, pitch_deg)).pitch.to_degrees();
@@ -158,7 +160,8 @@ fn a_wide_row_that_looks_up_is_drawn_level() {
     assert!(between.is_sorted_by(|wider, narrower| wider >= narrower), "{between:?}");
 }
 
-/// A facade 6 degrees aside is faced by photographs that are drawn level, and less and less the more they are looked at.
+/// A facade 6 degrees aside is faced by photographs that are drawn level, and less and less the more they are looked
+/// at.
 #[test]
 fn the_viewer_turns_aside_as_the_pitch_does() {
     let dominant = rotation_about_y(6_f64.to_radians());
@@ -173,7 +176,8 @@ fn the_viewer_turns_aside_as_the_pitch_does() {
     assert!(steps[0][0] > 2.0 && steps[25][0].abs() < 0.5 && farthest < 1.5, "{steps:?}");
 }
 
-/// Rings at 20, 50 and 75 degrees down, and straight down, as drones take them: a sphere. Without the first, what is below.
+/// Rings at 20, 50 and 75 degrees down, and straight down, as drones take them: a sphere. Without the first, what is
+/// below.
 #[test]
 fn a_drone_looks_round_and_down() {
     let ring = |count: u32, pitch_deg: f64| (0..count).map(move |k| photograph(f64::from(360 * k / count), pitch_deg));

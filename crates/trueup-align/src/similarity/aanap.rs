@@ -15,17 +15,17 @@ use crate::plane_similarity::{MatchedPoints, similarity_of_least_turn};
 /// Residual weight that keeps the reference as it was taken.
 const REFERENCE_WEIGHT: f64 = 1e4;
 
-/// The turns that AANAP's similarities mean, the reference unturned; `down` is the vertical that straightening finds, in
-/// the cameras' world.
+/// The turns that AANAP's similarities mean, the reference unturned; `down` is the vertical that straightening finds,
+/// in the cameras' world.
 ///
 /// # Source
 /// Lin et al., "Adaptive as-natural-as-possible image stitching" (2015), section 3.2: of the similarities of all planes
 /// that the matches of a pair lie on, the one of least rotation.
 ///
 /// # Departures
-/// The method is for pairs. The paper of VPG compares with an implementation of its own on up to 72 photographs, and says
-/// that it shares a mesh deformation framework with GSP and VPG. So here the turns of all pairs meet in least squares, as
-/// GSP's do, each pair weighing the same, and the mesh does the rest.
+/// The method is for pairs. The paper of VPG compares with an implementation of its own on up to 72 photographs, and
+/// says that it shares a mesh deformation framework with GSP and VPG. So here the turns of all pairs meet in least
+/// squares, as GSP's do, each pair weighing the same, and the mesh does the rest.
 pub(super) fn upright(
     input: &PriorInput<'_>,
     rotations: &[Matrix3<f64>],
@@ -43,7 +43,8 @@ pub(super) fn upright(
     Upright { down, theta, rotations: rotations.to_vec() }
 }
 
-/// theta_b - theta_a: what the similarity turns from a to b has to be turned back. `None` without four matches that determine one.
+/// theta_b - theta_a: what the similarity turns from a to b has to be turned back. `None` without four matches that
+/// determine one.
 fn least_turn(edge: &PairMatches, index: usize, context: &StageContext<'_>) -> Option<TurnTerm> {
     let side = |of: fn(&PointMatch) -> [f64; 2]| -> Vec<Vector2<f64>> {
         edge.inliers.iter().map(|one| Vector2::from(of(one))).collect()

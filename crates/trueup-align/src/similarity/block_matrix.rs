@@ -1,4 +1,5 @@
-//! Symmetric matrices of which each photograph has a block, sparse: its unknowns meet those of the photographs that overlap it.
+//! Symmetric matrices of which each photograph has a block, sparse: its unknowns meet those of the photographs that
+//! overlap it.
 
 use std::collections::BTreeMap;
 
@@ -54,7 +55,8 @@ mod tests {
 
     use super::*;
 
-    /// [[4, 1, 0, 2], [1, 5, 0, 0], [0, 0, 3, 0], [2, 0, 0, 6]] times (1, 2, 3, 4) is (14, 11, 9, 26), by hand; the coupling given once from above the diagonal.
+    /// [[4, 1, 0, 2], [1, 5, 0, 0], [0, 0, 3, 0], [2, 0, 0, 6]] times (1, 2, 3, 4) is (14, 11, 9, 26), by hand; the
+    /// coupling given once from above the diagonal.
     #[test]
     fn blocks_solve_what_their_matrix_says() {
         let mut matrix = BlockMatrix::<2>::zeros(2);

@@ -105,8 +105,9 @@ impl Deviations {
     }
 }
 
-/// Largest turn of two overlapping cameras against each other that segments are believed about, degrees: as much as a camera shows that moved by 20 cm, as at the end
-/// of an arm, before what is 3 m away (reasoned). What parallax leaves open may be more; but furniture stands askew in rooms, and its edges are level, too.
+/// Largest turn of two overlapping cameras against each other that segments are believed about, degrees: as much as a
+/// camera shows that moved by 20 cm, as at the end of an arm, before what is 3 m away (reasoned). What parallax leaves
+/// open may be more; but furniture stands askew in rooms, and its edges are level, too.
 const MOST_TURN_DEG: f64 = 4.0;
 
 /// Which segments of a photograph are heard about its camera's turn.
@@ -131,8 +132,8 @@ impl Heard {
 /// The rotations with the turns that the segments ask for. The common frame stays; `frame`'s columns are the scene's
 /// directions in it.
 ///
-/// Of a camera that would be turned against one that it overlaps by more than [`MOST_TURN_DEG`], the level segments are not heard, nor the
-/// upright ones if it still is.
+/// Of a camera that would be turned against one that it overlaps by more than [`MOST_TURN_DEG`], the level segments are
+/// not heard, nor the upright ones if it still is.
 pub(super) fn corrected_rotations(
     rotations: &[Matrix3<f64>],
     certainties: &[RelativeCertainty],
@@ -163,7 +164,8 @@ pub(super) fn corrected_rotations(
     }
 }
 
-/// Of every two overlapping photographs that are turned against each other by more than [`MOST_TURN_DEG`] the one that is turned more, each once.
+/// Of every two overlapping photographs that are turned against each other by more than [`MOST_TURN_DEG`] the one that
+/// is turned more, each once.
 fn turned_too_far(turns: &[Vector3<f64>], certainties: &[RelativeCertainty]) -> Vec<usize> {
     let too_far = |one: &&RelativeCertainty| (turns[one.i] - turns[one.j]).norm() > MOST_TURN_DEG.to_radians();
     let more = |one: &RelativeCertainty| if turns[one.j].norm() > turns[one.i].norm() { one.j } else { one.i };
@@ -173,13 +175,13 @@ fn turned_too_far(turns: &[Vector3<f64>], certainties: &[RelativeCertainty]) -> 
     found
 }
 
-/// The turns that the segments ask for; `None` where they cannot be told. `asked`: the normal matrix and the gradient of what the segments of a photograph say of its
-/// rotation, at a scale of the loss.
+/// The turns that the segments ask for; `None` where they cannot be told. `asked`: the normal matrix and the gradient
+/// of what the segments of a photograph say of its rotation, at a scale of the loss.
 ///
 /// Minimizes sum over segments of weight (Geman-McClure) (residual / [`LINE_ERROR_PX`])^2 plus sum over overlaps of
-/// (w_i - w_j)^T information (w_i - w_j) over turns w_i in the common frame whose mean is zero ([`TurnEquations`]), by reweighted
-/// Gauss-Newton steps from a coarse to a fine scale of the loss. A turn of all cameras together is not sought: `frame`
-/// is the segments' own choice for these.
+/// (w_i - w_j)^T information (w_i - w_j) over turns w_i in the common frame whose mean is zero ([`TurnEquations`]), by
+/// reweighted Gauss-Newton steps from a coarse to a fine scale of the loss. A turn of all cameras together is not
+/// sought: `frame` is the segments' own choice for these.
 fn turns(
     rotations: &[Matrix3<f64>],
     certainties: &[RelativeCertainty],
@@ -315,7 +317,8 @@ mod tests {
         assert!(largest(&errors) < 0.15, "{errors:?}");
     }
 
-    /// Of overlaps (0, 1) and (1, 2) the first is turned by 3 degrees, the second by 5, most of it the third photograph's.
+    /// Of overlaps (0, 1) and (1, 2) the first is turned by 3 degrees, the second by 5, most of it the third
+    /// photograph's.
     #[test]
     fn of_two_cameras_turned_too_far_the_one_that_is_turned_more_is_named() {
         let turns = [-1.0_f64, 2.0, -3.0].map(|degrees| Vector3::new(0.0, degrees.to_radians(), 0.0));

@@ -59,8 +59,8 @@ fn assert_close(values: &[f64], expected: &[f64], tolerance: f64) {
     assert!(close, "{values:?} instead of {expected:?}");
 }
 
-/// Eq. 5 takes the world's axes from the reference camera. One that is rolled by 50 degrees has the horizontal nearest to
-/// its y axis; six cameras together know better.
+/// Eq. 5 takes the world's axes from the reference camera. One that is rolled by 50 degrees has the horizontal nearest
+/// to its y axis; six cameras together know better.
 #[test]
 fn eq_5_as_printed_depends_on_the_reference() {
     let rotations: Vec<Matrix3<f64>> = [50.0_f64, 0.0, 0.0, 0.0, 0.0, 0.0]
@@ -101,10 +101,10 @@ fn eq_7_and_9_weigh_rolls_against_relative_rolls() {
     assert!((vectors[0][0].hypot(vectors[0][1]) - 0.996_674_625).abs() < 1e-9);
 }
 
-/// In the published form the equations act: the middle one of three photographs sees directions that are rolled by 8 degrees
-/// against its camera, and is drawn to its neighbors the more the greater lambda is. With weights 1 and beta 0, rolls 0, 8 and
-/// 0 would leave 8 / (1 + 3 lambda) degrees between them: 8, 2 and 0.26; the common vertical takes a third of the 8 degrees,
-/// which a pan of 30 degrees turns into a beta of 0.36 degrees.
+/// In the published form the equations act: the middle one of three photographs sees directions that are rolled by 8
+/// degrees against its camera, and is drawn to its neighbors the more the greater lambda is. With weights 1 and beta 0,
+/// rolls 0, 8 and 0 would leave 8 / (1 + 3 lambda) degrees between them: 8, 2 and 0.26; the common vertical takes a
+/// third of the 8 degrees, which a pan of 30 degrees turns into a beta of 0.36 degrees.
 #[test]
 fn lambda_matters_in_the_published_form() {
     let mut scene = rolled_row(&[0.0; 3]);
@@ -120,8 +120,8 @@ fn lambda_matters_in_the_published_form() {
 }
 
 /// On the row 0 - 1 - 2 with rolls 0, 0, 20 and beta 0: from 0, the path to 1 supports (length 1), that to 2 opposes
-/// (3 + 1 - 2 = 2); from 1, one supports (1), one opposes (3); from 2, both oppose. psi = 1 / (1 + exp(-10 (x - 1/2))) of
-/// x = 1/3, 1/4 and 0.
+/// (3 + 1 - 2 = 2); from 1, one supports (1), one opposes (3); from 2, both oppose. psi = 1 / (1 + exp(-10 (x - 1/2)))
+/// of x = 1/3, 1/4 and 0.
 #[test]
 fn eq_8_weighs_paths_by_their_lengths() {
     let rolls = [0.0_f64, 0.0, 20.0].map(|roll| Some(roll.to_radians()));
@@ -129,8 +129,8 @@ fn eq_8_weighs_paths_by_their_lengths() {
     assert_close(&weights, &[0.158_869_105, 0.075_858_180, 0.006_692_851], 1e-9);
 }
 
-/// Matches on a square of 100 px in one photograph and of 50 px in the other: eta = 2. The photograph in which they span more
-/// must shrink: s = 2/3 and 4/3; as printed it is enlarged: 4/3 and 2/3.
+/// Matches on a square of 100 px in one photograph and of 50 px in the other: eta = 2. The photograph in which they
+/// span more must shrink: s = 2/3 and 4/3; as printed it is enlarged: 4/3 and 2/3.
 #[test]
 fn eq_10_and_11_shrink_the_photograph_in_which_matches_span_more() {
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]];
@@ -142,7 +142,8 @@ fn eq_10_and_11_shrink_the_photograph_in_which_matches_span_more() {
     assert_close(&scales(as_printed("scale")), &[4.0 / 3.0, 2.0 / 3.0], 1e-12);
 }
 
-/// Two of four photographs agree, with residuals 0.1 and 0.3: their mean over their share is 0.4, their sum over it 0.8.
+/// Two of four photographs agree, with residuals 0.1 and 0.3: their mean over their share is 0.4, their sum over it
+/// 0.8.
 #[test]
 fn eq_15_is_a_mean_over_the_share_of_agreeing_photographs() {
     assert!((gate::divergence(&[0.1, 0.3], 4, false) - 0.4).abs() < 1e-12);
@@ -191,7 +192,8 @@ fn the_published_form_falls_back_to_gsp_in_three_dimensions() {
     assert_ne!(fallen.theta, prior(PriorMethod::VanishingPoints, &straightened).theta);
 }
 
-/// Relative rolls have the opposite sign in print: cameras rolled by 5 and 17 degrees ask for 12 degrees from one to the other.
+/// Relative rolls have the opposite sign in print: cameras rolled by 5 and 17 degrees ask for 12 degrees from one to
+/// the other.
 #[test]
 fn the_printed_relative_roll_turns_neighbors_the_wrong_way() {
     let mut scene = rolled_row(&[5.0, 17.0]);

@@ -12,17 +12,18 @@ pub(super) struct GateEvidence {
     pub inliers: usize,
     /// The divergence epsilon.
     pub divergence: f64,
-    /// Angle in radians between the dominant vertical and the cameras' own, and the same in deviations of the latter; `None` where the
-    /// cameras do not fix one.
+    /// Angle in radians between the dominant vertical and the cameras' own, and the same in deviations of the latter;
+    /// `None` where the cameras do not fix one.
     pub from_cameras: Option<CameraAngle>,
     /// How far the best frame of the pooled search stands out, standard deviations; `None` without that search.
     pub significance: Option<f64>,
     /// Median over the inliers of |alpha_i|, of two the lesser, radians.
     pub median_roll: f64,
-    /// Root mean square in radians of the rolls that the photographs would have, of those that were held alike; `None` where recorded gravity tells, so that
-    /// nothing is expected of them.
+    /// Root mean square in radians of the rolls that the photographs would have, of those that were held alike; `None`
+    /// where recorded gravity tells, so that nothing is expected of them.
     pub rolls: Option<f64>,
-    /// Where hardly any photograph shows upright lines, how far the dominant vertical lies from what is known without lines, in its standard deviations.
+    /// Where hardly any photograph shows upright lines, how far the dominant vertical lies from what is known without
+    /// lines, in its standard deviations.
     pub by_level_lines: Option<f64>,
 }
 
@@ -33,17 +34,17 @@ pub(super) struct CameraAngle {
     pub angle: f64,
     /// In standard deviations of the cameras' own vertical, as their rolls, and gravity that they recorded, leave it.
     pub deviations: f64,
-    /// Root mean square of the photographs' rolls by it in radians, of those that were held alike, where nothing but the expectation that they look level tells
-    /// how far up or down they look; `None` elsewhere.
+    /// Root mean square of the photographs' rolls by it in radians, of those that were held alike, where nothing but
+    /// the expectation that they look level tells how far up or down they look; `None` elsewhere.
     pub rolls: Option<f64>,
     /// Whether cameras recorded gravity: then they know how they were held.
     pub is_recorded: bool,
 }
 
 impl CameraAngle {
-    /// Whether it is farther than the cameras allow: where their rolls contradict each other, as with one photograph on its corner, they
-    /// know little; so do two that may look up or down alike, if lines agree closely; and however many, which may all be held rolled alike, where
-    /// more agree closely than do by chance.
+    /// Whether it is farther than the cameras allow: where their rolls contradict each other, as with one photograph on
+    /// its corner, they know little; so do two that may look up or down alike, if lines agree closely; and however
+    /// many, which may all be held rolled alike, where more agree closely than do by chance.
     pub(super) fn is_too_wide(self, agreement: Agreement) -> bool {
         // Not-a-number is too wide.
         let is_near = self.angle.to_degrees() <= MAX_CAMERA_ANGLE_DEG || self.deviations <= MAX_CAMERA_DEVIATIONS;
@@ -92,26 +93,30 @@ const MIN_INLIER_SHARE: f64 = 0.4;
 /// How far the best frame must stand out in the pooled search to confirm the photographs' own directions, standard
 /// deviations. Measured: chosen on the 130 sets of the gate's experiment and on real sets.
 const CONFIRMING_SIGNIFICANCE: f64 = 5.0;
-/// By how much the logarithm of the chance falls for each standard deviation by which lines of a scene without dominant directions stand out. Measured: of 157 pairs and
-/// triples of such, rendered and cut, 57 stand out by 5, 15 by 5.5, 7 by 6 and 4 by 6.5.
+/// By how much the logarithm of the chance falls for each standard deviation by which lines of a scene without dominant
+/// directions stand out. Measured: of 157 pairs and triples of such, rendered and cut, 57 stand out by 5, 15 by 5.5, 7
+/// by 6 and 4 by 6.5.
 const SIGNIFICANCE_LOG_ODDS: f64 = 2.0;
-/// Power of the divergence by which the chance falls that unrelated triads meet within it: with the cube of their angle.
+/// Power of the divergence by which the chance falls that unrelated triads meet within it: with the cube of their
+/// angle.
 const DIVERGENCE_POWER: f64 = 1.5;
-/// How far lines must stand out for very few photographs to agree less closely, standard deviations. Measured: below it, pairs that agree less
-/// closely than [`SimilarityOptions::max_divergence_few`] are wrong as often as not.
+/// How far lines must stand out for very few photographs to agree less closely, standard deviations. Measured: below
+/// it, pairs that agree less closely than [`SimilarityOptions::max_divergence_few`] are wrong as often as not.
 const WIDENING_SIGNIFICANCE: f64 = 6.0;
-/// Roll that photographers leave, with the tail of those that mean it, degrees. Measured: of 63 pairs and triples whose lines are right, 56 are rolled by less
-/// than 3.5; of 15 whose lines are wrong, 2.
+/// Roll that photographers leave, with the tail of those that mean it, degrees. Measured: of 63 pairs and triples whose
+/// lines are right, 56 are rolled by less than 3.5; of 15 whose lines are wrong, 2.
 const EXPECTED_ROLL_DEG: f64 = 2.5;
 /// Largest angle between the dominant vertical and the one that the cameras tell, degrees ...
 const MAX_CAMERA_ANGLE_DEG: f64 = 20.0;
 /// ... unless it is this few of the cameras' own deviations.
 const MAX_CAMERA_DEVIATIONS: f64 = 2.0;
-/// Largest angle of the same where photographs that all look up or down explain it, as two of a tower do, or that were all held rolled, degrees. Beyond, what lies level before the camera
-/// may be taken for the vertical: with pitches that scatter by 20 degrees (reasoned), that they look the other way, onto a floor, is more than an eighth as probable.
+/// Largest angle of the same where photographs that all look up or down explain it, as two of a tower do, or that were
+/// all held rolled, degrees. Beyond, what lies level before the camera may be taken for the vertical: with pitches that
+/// scatter by 20 degrees (reasoned), that they look the other way, onto a floor, is more than an eighth as probable.
 const MAX_STEEP_DEG: f64 = 36.0;
-/// Share of [`SimilarityOptions::max_divergence_few`] that is believed there: 2.3 times as many directions lie within 36 degrees of pitch and 20 of roll as within 20 of the vertical,
-/// and the chance that unrelated triads meet falls with the divergence's power of 3/2.
+/// Share of [`SimilarityOptions::max_divergence_few`] that is believed there: 2.3 times as many directions lie within
+/// 36 degrees of pitch and 20 of roll as within 20 of the vertical, and the chance that unrelated triads meet falls
+/// with the divergence's power of 3/2.
 const STEEP_DIVERGENCE_SHARE: f64 = 0.58;
 /// Largest median roll of the agreeing photographs, degrees.
 const MAX_MEDIAN_ROLL_DEG: f64 = 45.0;
@@ -120,8 +125,9 @@ const MAX_MEDIAN_ROLL_DEG: f64 = 45.0;
 ///
 /// # Departures
 /// The paper has one threshold. Two or three unrelated triads meet within it once in ten times; the chance falls with
-/// the cube of the angle they must meet within, so that very few photographs have to agree more closely. Where their lines stand out by more than
-/// chance does ([`WIDENING_SIGNIFICANCE`]), they may agree less closely by what that is rarer.
+/// the cube of the angle they must meet within, so that very few photographs have to agree more closely. Where their
+/// lines stand out by more than chance does ([`WIDENING_SIGNIFICANCE`]), they may agree less closely by what that is
+/// rarer.
 pub(super) fn allowed_divergence(photographs: usize, significance: Option<f64>, options: &SimilarityOptions) -> f64 {
     let few = options.max_divergence.min(options.max_divergence_few);
     match options.gate {
@@ -134,8 +140,9 @@ pub(super) fn allowed_divergence(photographs: usize, significance: Option<f64>, 
     }
 }
 
-/// How far the lines must stand out to confirm directions by which very few photographs would be rolled so: as many standard deviations more as make up for
-/// how rarely photographers roll by it, up to what stands out by itself. So must those of few that do not `agree_as_very_few_must`.
+/// How far the lines must stand out to confirm directions by which very few photographs would be rolled so: as many
+/// standard deviations more as make up for how rarely photographers roll by it, up to what stands out by itself. So
+/// must those of few that do not `agree_as_very_few_must`.
 fn needed_significance(photographs: usize, agree_as_very_few_must: bool, rolls: Option<f64>) -> f64 {
     let could_be_chance =
         photographs <= VERY_FEW_PHOTOGRAPHS || photographs <= FEW_PHOTOGRAPHS && !agree_as_very_few_must;
@@ -144,9 +151,11 @@ fn needed_significance(photographs: usize, agree_as_very_few_must: bool, rolls: 
     (CONFIRMING_SIGNIFICANCE + unexpected / SIGNIFICANCE_LOG_ODDS).min(GUIDING_SIGNIFICANCE)
 }
 
-/// How many deviations a vertical that hardly any photograph shows may lie from what is known without lines, where all lines together stand out by `beyond` standard deviations more
-/// than they must: as many as that makes up for how improbable it is. Skylines and slopes of nature make frames of level lines by chance; of some 600 cut sets four had such
-/// frames, at 0.5 deviations (2 degrees off, and standing out by 8.2), 4.5 (88 degrees, 7.1), 7.3 (17 degrees, 5.8) and 7.7 (12 degrees, 7.04).
+/// How many deviations a vertical that hardly any photograph shows may lie from what is known without lines, where all
+/// lines together stand out by `beyond` standard deviations more than they must: as many as that makes up for how
+/// improbable it is. Skylines and slopes of nature make frames of level lines by chance; of some 600 cut sets four had
+/// such frames, at 0.5 deviations (2 degrees off, and standing out by 8.2), 4.5 (88 degrees, 7.1), 7.3 (17 degrees,
+/// 5.8) and 7.7 (12 degrees, 7.04).
 pub(super) fn allowed_of_level_lines(beyond: f64) -> f64 {
     (2.0 * SIGNIFICANCE_LOG_ODDS * beyond.max(0.0)).sqrt()
 }
@@ -234,7 +243,8 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
     })
 }
 
-/// A value and the limit that refused it in words, with `decimals` or as many more as tell them apart: not "20.0 (20.0 allowed)".
+/// A value and the limit that refused it in words, with `decimals` or as many more as tell them apart: not "20.0 (20.0
+/// allowed)".
 fn told_apart(value: f64, limit: f64, decimals: usize) -> (String, String) {
     /// Beyond, two numbers are the same to a reader.
     const MOST_MORE: usize = 4;
@@ -281,7 +291,8 @@ mod tests {
         assert!(refused_where(true, 4, 0.001, 30.0, None), "they know how they were held");
     }
 
-    /// 5 + (5 / 2.5)^2 / 2 / 2 = 6 standard deviations for rolls of 5 degrees, and never more than 7; 0.02 exp(2 (6.6 - 6) / 1.5) = 0.0445.
+    /// 5 + (5 / 2.5)^2 / 2 / 2 = 6 standard deviations for rolls of 5 degrees, and never more than 7; 0.02 exp(2 (6.6 -
+    /// 6) / 1.5) = 0.0445.
     #[test]
     fn what_lines_stand_out_by_makes_up_for_rolls_and_divergence() {
         let refused = |divergence: f64, significance: f64, rolls_deg: f64, photographs: usize| {
@@ -309,7 +320,8 @@ mod tests {
         assert!(refused(0.11, 12.0, 1.0, 2), "no more than with many photographs");
     }
 
-    /// sqrt(2 x 2 x (7 - 5)) = 2.83 deviations from the cameras' vertical are allowed to lines that stand out by 7, however many photographs agree.
+    /// sqrt(2 x 2 x (7 - 5)) = 2.83 deviations from the cameras' vertical are allowed to lines that stand out by 7,
+    /// however many photographs agree.
     #[test]
     fn level_lines_alone_stand_out_by_more_the_farther_they_lie_from_the_cameras() {
         let refused = |significance: f64, by_level_lines: Option<f64>| {

@@ -3,8 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::source::{GravitySource, RecordedGravity};
 
-/// Standard deviation about each axis that is expected of a recorded vertical, degrees, before the photographs show their own.
-/// Reasoned: accelerometers of telephones are off by about a degree while a hand moves; gimbals hold to a tenth, but drift by as much.
+/// Standard deviation about each axis that is expected of a recorded vertical, degrees, before the photographs show
+/// their own. Reasoned: accelerometers of telephones are off by about a degree while a hand moves; gimbals hold to a
+/// tenth, but drift by as much.
 const fn expected_deviation_deg(source: GravitySource) -> f64 {
     match source {
         GravitySource::AppleAcceleration => 1.0,
@@ -37,7 +38,8 @@ pub(super) struct MeanGravity {
 }
 
 impl MeanGravity {
-    /// The mean of the photographs that recorded it and agree, seen through the cameras' `rotations` from the common frame; its deviation is that of the scatter found, and of what all err by alike.
+    /// The mean of the photographs that recorded it and agree, seen through the cameras' `rotations` from the common
+    /// frame; its deviation is that of the scatter found, and of what all err by alike.
     ///
     /// `None` where no photograph recorded it, or they contradict each other.
     pub(super) fn of(rotations: &[Matrix3<f64>], recorded: &[Option<RecordedGravity>]) -> Option<Self> {
@@ -80,7 +82,8 @@ fn median_off(seen: &[(Vector3<f64>, f64)], down: &Vector3<f64>) -> f64 {
     off.get(off.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// The direction that the angles to all others are least from, in sum: a start that outliers do not move. The first of equals.
+/// The direction that the angles to all others are least from, in sum: a start that outliers do not move. The first of
+/// equals.
 fn most_central(seen: &[(Vector3<f64>, f64)]) -> Option<Vector3<f64>> {
     let apart = |one: &Vector3<f64>| seen.iter().map(|(other, _)| one.angle(other)).sum::<f64>();
     seen.iter().map(|(one, _)| (apart(one), *one)).min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, one)| one)
@@ -117,8 +120,9 @@ mod tests {
         assert_eq!(found.photographs, 6);
     }
 
-    /// The stated deviation is that of the errors: in 400 draws of sixteen photographs that scatter by twice what is expected, the mean
-    /// square of the error about both axes is twice the stated variance, less what all err by alike, to a quarter.
+    /// The stated deviation is that of the errors: in 400 draws of sixteen photographs that scatter by twice what is
+    /// expected, the mean square of the error about both axes is twice the stated variance, less what all err by alike,
+    /// to a quarter.
     #[test]
     fn the_deviation_is_that_of_the_scatter() {
         const DRAWS: usize = 400;

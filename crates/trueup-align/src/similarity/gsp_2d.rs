@@ -38,16 +38,16 @@ struct Decided {
 
 /// The turns of the published prior; `down` is the vertical that straightening finds, in the cameras' world.
 ///
-/// The reference takes the roll that straightening finds for it, and the turn that the user wants. A walk from there leaves
-/// every photograph unturned whose overlap with a decided one allows that, and turns the others by least line distortion; a
-/// least squares then holds the reference and the unturned photographs and takes the turns of least line distortion along
-/// all edges. The result depends on the reference by construction: it alone stands upright among photographs that stay as
-/// they were taken.
+/// The reference takes the roll that straightening finds for it, and the turn that the user wants. A walk from there
+/// leaves every photograph unturned whose overlap with a decided one allows that, and turns the others by least line
+/// distortion; a least squares then holds the reference and the unturned photographs and takes the turns of least line
+/// distortion along all edges. The result depends on the reference by construction: it alone stands upright among
+/// photographs that stay as they were taken.
 ///
 /// # Source
-/// Chen and Chuang, Natural Image Stitching with the Global Similarity Prior (2016), section 4 (the 2D method), and what
-/// their program does: the reference's roll is that of its three-dimensional method, and the range of an overlap's turns
-/// is that of all its grid edges.
+/// Chen and Chuang, Natural Image Stitching with the Global Similarity Prior (2016), section 4 (the 2D method), and
+/// what their program does: the reference's roll is that of its three-dimensional method, and the range of an overlap's
+/// turns is that of all its grid edges.
 ///
 /// # Departures
 /// See `edge_range` for how the turn of least line distortion is measured.

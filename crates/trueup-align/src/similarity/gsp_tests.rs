@@ -183,8 +183,8 @@ fn gsp_2d_leaves_photographs_upright_where_the_overlaps_let_it_and_depends_on_th
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 3), &[-6.0, -5.0, -3.0, 0.0]);
 }
 
-/// The reference takes its straightened roll and the others, whose overlaps allow them to, stay as they were taken: each
-/// reference makes another panorama, which is what the paper holds against this prior.
+/// The reference takes its straightened roll and the others, whose overlaps allow them to, stay as they were taken:
+/// each reference makes another panorama, which is what the paper holds against this prior.
 #[test]
 fn gsp_2d_straightens_its_reference_alone() {
     let mut graph = Graph::new(3, &[edge(0, 1, [-9.0, 9.0], 0.0), edge(1, 2, [-9.0, 9.0], 0.0)]);

@@ -6,15 +6,15 @@ use nalgebra::{Matrix3, Vector3};
 const EXPECTED_ROLL_DEG: f64 = 5.0;
 /// How far photographs look up or down, degrees. Reasoned.
 const EXPECTED_PITCH_DEG: f64 = 25.0;
-/// Square of the roll, in expected ones, of a camera that was turned on purpose, by whatever angle. Reasoned: rarer than a photograph that looks up by 60
-/// degrees, more frequent than one of the zenith.
+/// Square of the roll, in expected ones, of a camera that was turned on purpose, by whatever angle. Reasoned: rarer
+/// than a photograph that looks up by 60 degrees, more frequent than one of the zenith.
 const TURNED: f64 = 12.0;
-/// Largest angle that two cameras are rolled against each other by where both are held level, degrees. Reasoned: rolls scatter by 1 to 5 degrees, and what
-/// is turned on purpose is turned farther.
+/// Largest angle that two cameras are rolled against each other by where both are held level, degrees. Reasoned: rolls
+/// scatter by 1 to 5 degrees, and what is turned on purpose is turned farther.
 const MAX_HELD_APART_DEG: f64 = 20.0;
 
-/// How improbably cameras are held if the vertical is `down` or its opposite: mean squares of their roll, of which none counts for more than
-/// [`TURNED`], and of how far they look up or down, each in units of what is expected of it.
+/// How improbably cameras are held if the vertical is `down` or its opposite: mean squares of their roll, of which none
+/// counts for more than [`TURNED`], and of how far they look up or down, each in units of what is expected of it.
 pub(super) fn improbability(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> f64 {
     let square = |sine: f64, expected_deg: f64| (sine.clamp(-1.0, 1.0).asin() / expected_deg.to_radians()).powi(2);
     let of_one = |rotation: &Matrix3<f64>| {
@@ -24,7 +24,8 @@ pub(super) fn improbability(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> 
     rotations.iter().map(of_one).sum::<f64>() / rotations.len() as f64
 }
 
-/// Most of the cameras, those that are held alike; all of them where no more than half are. Least squares would look for a vertical between the others and these.
+/// Most of the cameras, those that are held alike; all of them where no more than half are. Least squares would look
+/// for a vertical between the others and these.
 pub(super) fn held_alike(rotations: &[Matrix3<f64>]) -> Vec<Matrix3<f64>> {
     // Somebody holds the camera level.
     let candidates = rotations.iter().map(|rotation| rotation.row(1).transpose());
@@ -37,8 +38,9 @@ pub(super) fn held_alike(rotations: &[Matrix3<f64>]) -> Vec<Matrix3<f64>> {
     }
 }
 
-/// Root mean square in radians of the rolls of cameras if the vertical is `down`. Cameras that are rolled against the one that is rolled least by more
-/// than anybody who holds them level does were turned on purpose, whatever the vertical is, and are not counted.
+/// Root mean square in radians of the rolls of cameras if the vertical is `down`. Cameras that are rolled against the
+/// one that is rolled least by more than anybody who holds them level does were turned on purpose, whatever the
+/// vertical is, and are not counted.
 pub(super) fn held_roll(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> f64 {
     let held = held(rotations, down);
     (held.iter().map(|(_, roll)| roll * roll).sum::<f64>() / held.len() as f64).sqrt()

@@ -12,7 +12,8 @@ use crate::far_horizon::ShownPhotograph;
 use crate::match_points::OverlapWarp;
 use crate::vanishing::{TriadOutcome, VanishingOptions};
 
-/// What the prior is made from. Photographs are counted 0..N; all lists but `gravity`, `shown`, `edges` and `overlaps` have N entries.
+/// What the prior is made from. Photographs are counted 0..N; all lists but `gravity`, `shown`, `edges` and `overlaps`
+/// have N entries.
 #[derive(Debug, Clone, Copy)]
 pub struct PriorInput<'a> {
     /// Which prior is wanted.

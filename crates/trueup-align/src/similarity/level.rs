@@ -1,8 +1,8 @@
 //! One vertical of everything that tells of it, each by how sure it is.
 //!
-//! The cameras expect to be held level, sensors recorded gravity, a far horizon is level, lines point down. Each gives a direction and a
-//! covariance; the vertical is the direction of least summed squares, each in units of its own deviation, so that none is
-//! believed altogether or not at all.
+//! The cameras expect to be held level, sensors recorded gravity, a far horizon is level, lines point down. Each gives
+//! a direction and a covariance; the vertical is the direction of least summed squares, each in units of its own
+//! deviation, so that none is believed altogether or not at all.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -24,13 +24,14 @@ const EXPECTED_ROLL_DEG: f64 = 2.0;
 const EXPECTED_COUNT: f64 = 2.0;
 /// The two angles of a vertical are fitted to the rolls.
 const FITTED: f64 = 2.0;
-/// How many of its deviations the cameras' level lies from the vertical when it counts for a quarter (Geman-McClure): nothing
-/// keeps photographers from tilting all photographs alike.
+/// How many of its deviations the cameras' level lies from the vertical when it counts for a quarter (Geman-McClure):
+/// nothing keeps photographers from tilting all photographs alike.
 const HELD_SCALE: f64 = 2.0;
-/// A far horizon farther from the vertical of lines that may guide than so many deviations of both is none: what lines agree on is seen as well, and in
-/// most scenes by more photographs.
+/// A far horizon farther from the vertical of lines that may guide than so many deviations of both is none: what lines
+/// agree on is seen as well, and in most scenes by more photographs.
 const MAX_HORIZON_DEVIATIONS: f64 = 4.0;
-/// Least standard deviation of a vertical, radians: what directions in double precision tell apart. A jackknife over lines that leave a frame where it is finds none.
+/// Least standard deviation of a vertical, radians: what directions in double precision tell apart. A jackknife over
+/// lines that leave a frame where it is finds none.
 const LEAST_DEVIATION: f64 = 1.5e-8;
 /// Least share of the information at which lines that do not guide are said to take part.
 const LEAST_SHARE: f64 = 0.05;
@@ -66,7 +67,8 @@ pub struct LevelEvidence {
     pub share: f64,
 }
 
-/// A source before it is weighed: squares of a direction d are d^T `moment` d + (d - `down`)^T `information` (d - `down`).
+/// A source before it is weighed: squares of a direction d are d^T `moment` d + (d - `down`)^T `information` (d -
+/// `down`).
 #[derive(Debug, Clone, Copy)]
 struct Say {
     source: LevelSource,
@@ -81,8 +83,8 @@ struct Say {
 impl Say {
     /// Of what was seen: `across` is what it tells of turns of `down` along the columns of its tangent basis, rad^-2.
     ///
-    /// Along `down` itself it tells as much as it does least across: to turns by small angles that says nothing, and the opposite of what
-    /// was seen, which is orthogonal to the same tangents, is not as good.
+    /// Along `down` itself it tells as much as it does least across: to turns by small angles that says nothing, and
+    /// the opposite of what was seen, which is orthogonal to the same tangents, is not as good.
     fn seen(source: LevelSource, photographs: usize, down: Vector3<f64>, across: &Matrix2<f64>) -> Self {
         let basis = tangent_basis(&down);
         let least = across.symmetric_eigenvalues().min().max(0.0);
@@ -112,7 +114,8 @@ impl Say {
         Self { moment: self.moment * (1.0 + self.expected_beyond(down)).powi(-2), ..*self }
     }
 
-    /// The squares of `down` beyond its own that are minimized: of what was only expected, no more than the square of the scale.
+    /// The squares of `down` beyond its own that are minimized: of what was only expected, no more than the square of
+    /// the scale.
     fn cost(&self, down: &Vector3<f64>) -> f64 {
         let expected = self.expected_beyond(down);
         HELD_SCALE.powi(2) * expected / (1.0 + expected) + self.seen_beyond(down)
@@ -151,8 +154,8 @@ pub(super) struct CameraLevel<'a> {
 }
 
 impl<'a> CameraLevel<'a> {
-    /// Of the cameras with what [`straighten_with_pitch`] expects of them, but for few that were turned on purpose, and of the mean of recorded gravity, if
-    /// there is any.
+    /// Of the cameras with what [`straighten_with_pitch`] expects of them, but for few that were turned on purpose, and
+    /// of the mean of recorded gravity, if there is any.
     pub(super) fn new(rotations: &'a [Matrix3<f64>], pitch_prior: f64, gravity: Option<MeanGravity>) -> Self {
         let held = held_alike(rotations);
         let level = straighten_with_pitch(&held, pitch_prior);
@@ -197,9 +200,9 @@ impl<'a> CameraLevel<'a> {
         greatest_deviation(&information(&heeded, &self.down))
     }
 
-    /// How far a vertical lies from the one that the cameras tell, without the far horizon: with recorded gravity; of two photographs, whose x axes
-    /// contradict nothing, as they expect to be held; or by straightening as published if the cameras fix that. The horizon is compared with lines where
-    /// both are weighed.
+    /// How far a vertical lies from the one that the cameras tell, without the far horizon: with recorded gravity; of
+    /// two photographs, whose x axes contradict nothing, as they expect to be held; or by straightening as published if
+    /// the cameras fix that. The horizon is compared with lines where both are weighed.
     pub(super) fn angle_to(&self, down: &Vector3<f64>) -> Option<CameraAngle> {
         let own = match (self.has_gravity, self.straightened.conditioned) {
             (true, _) => self.held,
@@ -230,7 +233,8 @@ impl<'a> CameraLevel<'a> {
         Self { down: self.held, says: held.collect(), ..*self }
     }
 
-    /// The same without a far horizon that contradicts `lines` that may guide, whose vertical deviates by `deviation` radians.
+    /// The same without a far horizon that contradicts `lines` that may guide, whose vertical deviates by `deviation`
+    /// radians.
     pub(super) fn without_contradicted_horizon(&self, lines: &Vector3<f64>, deviation: f64) -> Self {
         let contradicts = |say: &Say| {
             let off = lines.angle(&say.down);
@@ -239,8 +243,10 @@ impl<'a> CameraLevel<'a> {
         if self.says.iter().any(contradicts) { self.without_horizon() } else { self.clone() }
     }
 
-    /// What told of the vertical `down`, which has the covariance `covariance` about its tangents, rad^2, with lines in `photographs` photographs: the lines first. `covariance` is that
-    /// of all together, so that the lines' share comes of what its inverse has beyond the information of the other sources. `None` where that is less than [`LEAST_SHARE`].
+    /// What told of the vertical `down`, which has the covariance `covariance` about its tangents, rad^2, with lines in
+    /// `photographs` photographs: the lines first. `covariance` is that of all together, so that the lines' share comes
+    /// of what its inverse has beyond the information of the other sources. `None` where that is less than
+    /// [`LEAST_SHARE`].
     pub(super) fn evidence_beside_lines(
         &self,
         down: &Vector3<f64>,
@@ -257,8 +263,8 @@ impl<'a> CameraLevel<'a> {
         evidence.first().is_some_and(|lines| lines.share >= LEAST_SHARE).then_some(evidence)
     }
 
-    /// The vertical with what lines in `photographs` photographs say of it, whose covariance is `covariance`, rad^2, weighed in; and
-    /// what told of it, the lines first.
+    /// The vertical with what lines in `photographs` photographs say of it, whose covariance is `covariance`, rad^2,
+    /// weighed in; and what told of it, the lines first.
     pub(super) fn with_lines(
         &self,
         lines: &Vector3<f64>,
@@ -278,16 +284,16 @@ impl<'a> CameraLevel<'a> {
     }
 }
 
-/// Variance of the cameras' rolls about `level`, of which two angles were fitted; with what is expected of photographers, which few
-/// photographs do not refute.
+/// Variance of the cameras' rolls about `level`, of which two angles were fitted; with what is expected of
+/// photographers, which few photographs do not refute.
 fn roll_variance(rotations: &[Matrix3<f64>], level: &Vector3<f64>) -> f64 {
     let squares: f64 = rotations.iter().map(|rotation| rotation.row(0).transpose().dot(level).powi(2)).sum();
     let free = (rotations.len() as f64 - FITTED).max(0.0);
     (squares + EXPECTED_COUNT * EXPECTED_ROLL_DEG.to_radians().powi(2)) / (free + EXPECTED_COUNT)
 }
 
-/// The direction of least squares. As what was only expected gives way, there is one near what was seen and one near what was expected: steps begin at
-/// what each say means by itself, and end where the cost is least.
+/// The direction of least squares. As what was only expected gives way, there is one near what was seen and one near
+/// what was expected: steps begin at what each say means by itself, and end where the cost is least.
 fn combined(says: &[Say]) -> Vector3<f64> {
     let cost = |down: &Vector3<f64>| says.iter().map(|say| say.cost(down)).sum::<f64>();
     let ends = says.iter().map(|say| descended(says, &say.down)).map(|down| (cost(&down), down));
@@ -352,8 +358,8 @@ mod tests {
         Some(MeanGravity { down, deviation, photographs: 4 })
     }
 
-    /// By symmetry the level is y. The variance of a roll is (4 sin^2 r + 2 e^2) / (2 + 2) with e the expected roll, and either
-    /// horizontal axis is fixed by 2 cos^2 r + 2 p.
+    /// By symmetry the level is y. The variance of a roll is (4 sin^2 r + 2 e^2) / (2 + 2) with e the expected roll,
+    /// and either horizontal axis is fixed by 2 cos^2 r + 2 p.
     #[test]
     fn the_level_of_cameras_is_as_certain_as_rolls_let_it_be() {
         let roll = 0.1_f64;
@@ -387,8 +393,8 @@ mod tests {
         assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
 
-    /// Lines sure to 0.001 one way and to 1 the other, against gravity sure to 0.001 that is 0.002 off both ways: halfway the one way, all of it the other.
-    /// The cameras, sure to a degree, change either by less than a hundredth.
+    /// Lines sure to 0.001 one way and to 1 the other, against gravity sure to 0.001 that is 0.002 off both ways:
+    /// halfway the one way, all of it the other. The cameras, sure to a degree, change either by less than a hundredth.
     #[test]
     fn lines_are_heard_as_far_as_they_tell() {
         let rotations = all_round(0.0);
@@ -413,8 +419,8 @@ mod tests {
         assert!(shares[0] < 1e-3 && shares[1] > 0.999, "{shares:?}");
     }
 
-    /// Two of three photographs stand upright, one lies on its side: whichever way the vertical of lines points, with the cameras' level or against it, it
-    /// keeps its sense.
+    /// Two of three photographs stand upright, one lies on its side: whichever way the vertical of lines points, with
+    /// the cameras' level or against it, it keeps its sense.
     #[test]
     fn lines_are_not_stood_on_their_head() {
         let rolls = [0.0, FRAC_PI_2, 0.0];
@@ -430,7 +436,8 @@ mod tests {
         }
     }
 
-    /// The level of two photographs is that of three of which the third lies on its side; of two turned against each other both count.
+    /// The level of two photographs is that of three of which the third lies on its side; of two turned against each
+    /// other both count.
     #[test]
     fn who_turns_a_camera_on_purpose_does_not_tilt_the_level() {
         let views = [-0.4, 0.4, 0.0].map(|yaw| rotation_about_x(0.05) * rotation_about_y(yaw));
@@ -441,8 +448,9 @@ mod tests {
         assert_eq!(held_alike(&[views[0], on_its_side]).len(), 2);
     }
 
-    /// Lines 14 degrees from the cameras' level. Cameras whose level is sure to sqrt((2 e^2 / 4) / 2) = 1 degree cost at most 4, Geman and McClure's
-    /// scale squared; at their own level, lines that are sure to 10 degrees cost (14 / 10)^2, such as are sure to 3 (14 / 3)^2.
+    /// Lines 14 degrees from the cameras' level. Cameras whose level is sure to sqrt((2 e^2 / 4) / 2) = 1 degree cost
+    /// at most 4, Geman and McClure's scale squared; at their own level, lines that are sure to 10 degrees cost (14 /
+    /// 10)^2, such as are sure to 3 (14 / 3)^2.
     #[test]
     fn cameras_give_way_to_what_is_surer_than_their_distance_alone() {
         let rotations = all_round(0.0);
@@ -475,8 +483,8 @@ mod tests {
         assert!((horizon.deviation - 0.003).abs() < 1e-9);
     }
 
-    /// Lines sure to 0.002 and a horizon sure to 0.004, 0.01 apart, are 2.2 deviations of both: the mean lies at a fifth, but for what the cameras tell. 0.05 apart are 11, and
-    /// the horizon is none.
+    /// Lines sure to 0.002 and a horizon sure to 0.004, 0.01 apart, are 2.2 deviations of both: the mean lies at a
+    /// fifth, but for what the cameras tell. 0.05 apart are 11, and the horizon is none.
     #[test]
     fn a_far_horizon_that_contradicts_the_lines_does_not_count() {
         let rotations = all_round(0.0);

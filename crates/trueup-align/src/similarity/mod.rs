@@ -1,7 +1,7 @@
 //! The similarity prior: how each photograph should be turned and scaled so that the panorama stands upright.
 //!
-//! One file a prior (`vpg`, `gsp_2d`, `gsp_3d`, `aanap`; straightening is here); all share straightening, scales and the least
-//! squares over unit vectors.
+//! One file a prior (`vpg`, `gsp_2d`, `gsp_3d`, `aanap`; straightening is here); all share straightening, scales and
+//! the least squares over unit vectors.
 
 mod aanap;
 mod block_matrix;
@@ -70,11 +70,11 @@ pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
 pub use printed::PrintedEquations;
 pub use prior::{Guidance, SimilarityPrior, VerticalSpread};
 
-/// Farthest that a far horizon may lie from what cameras and gravity tell, in their deviations. Reasoned: nothing keeps photographers from tilting all photographs
-/// alike, which their rolls do not tell.
+/// Farthest that a far horizon may lie from what cameras and gravity tell, in their deviations. Reasoned: nothing keeps
+/// photographers from tilting all photographs alike, which their rolls do not tell.
 const FARTHEST_HORIZON_DEVIATIONS: f64 = 5.0;
-/// The same in degrees: of two photographs cameras know next to nothing. Measured: of cut scenes with a horizon the cameras' level was off by 10 at most, roofs of two
-/// photographs were taken for one that is 22 off.
+/// The same in degrees: of two photographs cameras know next to nothing. Measured: of cut scenes with a horizon the
+/// cameras' level was off by 10 at most, roofs of two photographs were taken for one that is 22 off.
 const FARTHEST_HORIZON_DEG: f64 = 15.0;
 /// What a user can do when lines do not guide the panorama.
 const REFUSED_HINT: &str =
@@ -86,8 +86,8 @@ const REFUSED_HINT: &str =
 /// global similarity priors alone.
 ///
 /// # Errors
-/// [`trueup_core::Error::Unsolvable`] if there are no photographs, the lists differ in length, an edge or the reference names a
-/// photograph that does not exist, a camera is not finite, or overlaps come without a usable grid;
+/// [`trueup_core::Error::Unsolvable`] if there are no photographs, the lists differ in length, an edge or the reference
+/// names a photograph that does not exist, a camera is not finite, or overlaps come without a usable grid;
 /// [`trueup_core::Error::Cancelled`].
 ///
 /// # Source
@@ -143,7 +143,8 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     })
 }
 
-/// What is known of the vertical without lines, with the far horizon if the method asks for the vertical and the photographs show one beyond doubt.
+/// What is known of the vertical without lines, with the far horizon if the method asks for the vertical and the
+/// photographs show one beyond doubt.
 fn with_far_horizon<'a>(
     level: CameraLevel<'a>,
     input: &PriorInput<'_>,
@@ -167,8 +168,9 @@ fn with_far_horizon<'a>(
 ///
 /// # Departures
 /// The paper falls back to the global similarity prior ([`Fallback::Gsp3d`]), which corrects turns that an overlap
-/// contradicts. Level photographs that look up are twisted against each other although neither is rolled; that correction
-/// rolls them by the twist, which adds up along a row. Their place on the level sphere has the twist already.
+/// contradicts. Level photographs that look up are twisted against each other although neither is rolled; that
+/// correction rolls them by the twist, which adds up along a row. Their place on the level sphere has the twist
+/// already.
 fn straightening(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> Upright {
     Upright { down: *down, theta: rolls(down, rotations), rotations: rotations.to_vec() }
 }

@@ -13,8 +13,8 @@ pub enum PriorMethod {
     /// The global similarity prior in two dimensions, as published: the reference is straightened, and every photograph
     /// stays as it was taken that its overlaps let be.
     Gsp2d,
-    /// The global similarity prior in three dimensions, as published: cameras straightened without a prior on their pitch,
-    /// corrected by overlaps from the reference outwards.
+    /// The global similarity prior in three dimensions, as published: cameras straightened without a prior on their
+    /// pitch, corrected by overlaps from the reference outwards.
     Gsp3d,
     /// AANAP's turns: of every overlap the similarity that turns least, from the reference as it was taken.
     Aanap,
@@ -25,7 +25,8 @@ trueup_core::choice! {
     pub enum BetaMode {
         /// The difference of the rolls that the dominant vertical means for each camera.
         World = "world",
-        /// The twist of the relative rotation, with the sign that the paper's eq. 7 needs; biased when cameras are pitched.
+        /// The twist of the relative rotation, with the sign that the paper's eq. 7 needs; biased when cameras are
+        /// pitched.
         Relative = "relative",
         /// The same with the sign of the rotation that the paper decomposes, which is the opposite one.
         Printed = "printed",
@@ -73,8 +74,8 @@ trueup_core::options! {
         /// Largest divergence of the vanishing directions. Raise it where lines are right and refused, lower it where
         /// directions that are none guide the panorama.
         max_divergence: f64 = 0.10, between(0.0, 1e3), "";
-        /// The same with three photographs or fewer, which agree by chance more easily; more where their lines stand out by more
-        /// than 6 standard deviations.
+        /// The same with three photographs or fewer, which agree by chance more easily; more where their lines stand
+        /// out by more than 6 standard deviations.
         max_divergence_few: f64 = 0.02, between(0.0, 1e3), "";
         /// Whether photographs that disagree are searched again near the dominant directions. Turn it off to keep to
         /// the published method.
@@ -90,19 +91,20 @@ trueup_core::options! {
         /// method.
         pooled_search: bool = true, Allowed::Any, "";
         /// Whether a vertical alone may guide where the horizontal directions do not agree, and whether a few upright
-        /// lines that may not guide tell of the level beside what else does. Turn it off where what looks vertical is not, as leaning trees or
-        /// masts.
+        /// lines that may not guide tell of the level beside what else does. Turn it off where what looks vertical is
+        /// not, as leaning trees or masts.
         vertical_only: bool = true, Allowed::Any, "";
-        /// Whether gravity that cameras recorded takes part in the vertical. Turn it off where a camera was tilted on purpose, or its
-        /// sensor is wrong.
+        /// Whether gravity that cameras recorded takes part in the vertical. Turn it off where a camera was tilted on
+        /// purpose, or its sensor is wrong.
         gravity: bool = true, Allowed::Any, "";
-        /// Whether the far horizon of sea or plain takes part in the vertical, where photographs show it beyond doubt. Turn it off where what
-        /// looks like one is not level: a long wall or a dike before the sky.
+        /// Whether the far horizon of sea or plain takes part in the vertical, where photographs show it beyond doubt.
+        /// Turn it off where what looks like one is not level: a long wall or a dike before the sky.
         far_horizon: bool = true, Allowed::Any, "";
-        /// What stands in for vanishing directions that are not believed. `gsp-3d` to compare with the published method.
+        /// What stands in for vanishing directions that are not believed. `gsp-3d` to compare with the published
+        /// method.
         fallback: Fallback = Fallback::Straightening, Allowed::Any, "";
-        /// Equations of the paper that are taken as they are printed, joined by +, where this program corrects them; `all`
-        /// or `none` of them. Name some to see what the correction does.
+        /// Equations of the paper that are taken as they are printed, joined by +, where this program corrects them;
+        /// `all` or `none` of them. Name some to see what the correction does.
         as_printed: PrintedEquations = PrintedEquations::NONE, Allowed::Any, "";
         /// How much straightening expects photographs to look level: variance of the roll over that of the pitch among
         /// photographers. Raise it if a panorama without buildings leans, lower it for photographs taken steeply up or

@@ -1,4 +1,5 @@
-//! Where the segments of all photographs together are heard, instead of the directions that photographs have of their own.
+//! Where the segments of all photographs together are heard, instead of the directions that photographs have of their
+//! own.
 
 use nalgebra::Matrix3;
 
@@ -11,10 +12,13 @@ use super::vpg::{SceneDirections, column_near};
 use crate::vanishing::frame_search::{GUIDING_SIGNIFICANCE, PooledFrames};
 use crate::vanishing::joint::{self, AxisWeights};
 
-/// Photographs whose own directions must agree for lines of all together not to outvote them: one photograph agrees with itself.
+/// Photographs whose own directions must agree for lines of all together not to outvote them: one photograph agrees
+/// with itself.
 const MIN_AGREEING: usize = 2;
-/// How many times better segments of all photographs fit another frame than the one that photographs agree on, for it to be heard instead. Of 273 cut sets two have more and then guide, whose verticals are 0.04
-/// instead of 3.2 degrees off, and 0.04 instead of 0.03; those of 19 with 1.02 to 1.25 would differ by 0.08 at most; of 61 photographed sets none has more than 1.12.
+/// How many times better segments of all photographs fit another frame than the one that photographs agree on, for it
+/// to be heard instead. Of 273 cut sets two have more and then guide, whose verticals are 0.04 instead of 3.2 degrees
+/// off, and 0.04 instead of 0.03; those of 19 with 1.02 to 1.25 would differ by 0.08 at most; of 61 photographed sets
+/// none has more than 1.12.
 const OUTVOTED: f64 = 1.25;
 
 /// A frame that the segments of all photographs stand for, farther from chance than what guides must be.
@@ -32,7 +36,8 @@ impl SceneDirections<'_> {
         Some(StandingOut { frame, significance })
     }
 
-    /// What stands out, as the directions that are heard: for where photographs agree on none, or on some that leave the vertical open, are refused or outvoted.
+    /// What stands out, as the directions that are heard: for where photographs agree on none, or on some that leave
+    /// the vertical open, are refused or outvoted.
     pub(super) fn pooled(
         &self,
         pooled: &StandingOut,
@@ -60,8 +65,8 @@ impl SceneDirections<'_> {
         Some(dominant)
     }
 
-    /// The prior of the frame that stands out, where segments fit it far better than the one that photographs agree on: with few lines each may take others for
-    /// its directions that nearly agree with its neighbors'.
+    /// The prior of the frame that stands out, where segments fit it far better than the one that photographs agree on:
+    /// with few lines each may take others for its directions that nearly agree with its neighbors'.
     pub(super) fn outvoted(
         &mut self,
         pooled: &PooledFrames,
@@ -86,9 +91,9 @@ impl SceneDirections<'_> {
         upright.map(|upright| (guidance, upright))
     }
 
-    /// Whether segments fit another frame better that photographs agree on themselves and that the pooled search, which found `frame`, could not see:
-    /// its vertical is out of reach. Before a tower that fills photographs taken upward, what stands out within reach is a frame of the lines that
-    /// lie between its edges.
+    /// Whether segments fit another frame better that photographs agree on themselves and that the pooled search, which
+    /// found `frame`, could not see: its vertical is out of reach. Before a tower that fills photographs taken upward,
+    /// what stands out within reach is a frame of the lines that lie between its edges.
     fn is_outdone(&self, frame: &Matrix3<f64>, own: &Dominant) -> bool {
         if !self.is_out_of_reach(&self.vertical(&own.frame)) || self.inliers(own).len() < MIN_AGREEING {
             return false;

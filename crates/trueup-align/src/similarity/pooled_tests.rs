@@ -43,7 +43,8 @@ fn the_segments_of_all_photographs_guide_where_no_photograph_has_directions() {
     assert!(!scene.prior(&alone).guidance.used);
 }
 
-/// Upright lines in two photographs of eight, six each: by these alone the vertical is known badly. The level ones of all photographs tell the rest.
+/// Upright lines in two photographs of eight, six each: by these alone the vertical is known badly. The level ones of
+/// all photographs tell the rest.
 #[test]
 fn level_lines_of_all_photographs_tell_the_vertical_where_few_are_upright() {
     let mut scene = without_triads(6, 30);
@@ -55,7 +56,8 @@ fn level_lines_of_all_photographs_tell_the_vertical_where_few_are_upright() {
     assert!(max(&scene.errors_deg(&prior)) < 0.2, "{:?}", scene.errors_deg(&prior));
 }
 
-/// Eight photographs whose segments are all along two level directions, which climb by `slope_deg`. Cameras are rolled by 3 degrees, and so know the vertical to 1.6.
+/// Eight photographs whose segments are all along two level directions, which climb by `slope_deg`. Cameras are rolled
+/// by 3 degrees, and so know the vertical to 1.6.
 fn without_upright_lines(slope_deg: f64) -> SyntheticScene {
     let sweep = Sweep { roll_sd_deg: 3.0, ..Sweep::default() };
     let level = with_lines(SyntheticScene::new(sweep, World::Random, 0.0, 13), 30, 0.5);
@@ -67,7 +69,8 @@ fn without_upright_lines(slope_deg: f64) -> SyntheticScene {
     scene
 }
 
-/// Skylines and slopes make a frame of right angles, too: where this one lies 7.6 deviations from the cameras', it would have to stand out by 21.
+/// Skylines and slopes make a frame of right angles, too: where this one lies 7.6 deviations from the cameras', it
+/// would have to stand out by 21.
 #[test]
 fn level_lines_alone_guide_near_where_the_cameras_call_down() {
     let near = without_upright_lines(0.0).prior(&SimilarityOptions::default()).guidance;
@@ -85,7 +88,8 @@ fn level_lines_alone_leave_open_what_they_slope() {
     assert!((1.914..1.95).contains(&deviation), "{deviation}");
 }
 
-/// Segments without noise fit the true frame with all of their weight, and one that is two degrees off with next to nothing of it.
+/// Segments without noise fit the true frame with all of their weight, and one that is two degrees off with next to
+/// nothing of it.
 #[test]
 fn segments_fit_the_frame_they_are_of() {
     let scene = with_lines(SyntheticScene::new(Sweep::default(), World::Random, 0.0, 11), 0, 0.0);
@@ -97,8 +101,8 @@ fn segments_fit_the_frame_they_are_of() {
     assert!(vote.fit(&(rotation_about_z(2_f64.to_radians()) * frame)) < 0.7 * vote.total_weight());
 }
 
-/// Before a tower that fills two photographs tilted by some 40 degrees, lines of another frame, a half of those along the tower's, stand out within the
-/// search's reach, where the tower's vertical does not lie.
+/// Before a tower that fills two photographs tilted by some 40 degrees, lines of another frame, a half of those along
+/// the tower's, stand out within the search's reach, where the tower's vertical does not lie.
 #[test]
 fn a_frame_does_not_guide_where_photographs_agree_on_a_better_one_out_of_reach() {
     let world = World::Manhattan { noise_deg: 0.3, bad_share: 0.0 };
@@ -117,7 +121,8 @@ fn a_frame_does_not_guide_where_photographs_agree_on_a_better_one_out_of_reach()
     assert!(guidance.used && guidance.pooled, "{:?}", guidance.failed_clause);
 }
 
-/// Photographs whose own directions agree, but in a frame of which two axes are 10 degrees and more from all lines, so that what little fits turns its vertical by 11 and 13 degrees: the segments of all of them outvote it.
+/// Photographs whose own directions agree, but in a frame of which two axes are 10 degrees and more from all lines, so
+/// that what little fits turns its vertical by 11 and 13 degrees: the segments of all of them outvote it.
 #[test]
 fn directions_that_agree_are_outvoted_by_the_segments_of_all() {
     let world = World::Manhattan { noise_deg: 0.3, bad_share: 0.0 };
@@ -134,7 +139,8 @@ fn directions_that_agree_are_outvoted_by_the_segments_of_all() {
     }
 }
 
-/// Photographs of a Manhattan world, all of them held rolled by as much, so that their row runs askew through it. Returns the guidance and the largest error of the rolls, degrees.
+/// Photographs of a Manhattan world, all of them held rolled by as much, so that their row runs askew through it.
+/// Returns the guidance and the largest error of the rolls, degrees.
 fn held_rolled(count: usize, rolled_deg: f64, noise_deg: f64) -> (Guidance, f64) {
     let sweep = Sweep { count, roll_sd_deg: 1.0, ..Sweep::default() };
     let mut scene = SyntheticScene::new(sweep, World::Random, 0.0, 3);
@@ -151,8 +157,9 @@ fn held_rolled(count: usize, rolled_deg: f64, noise_deg: f64) -> (Guidance, f64)
     (prior.guidance, worst)
 }
 
-/// A row of photographs that were all rolled alike looks level to the cameras. Four that agree closely are believed, three are not, nor are five that only
-/// agree as far as the gate allows near the cameras' level, nor what is as near to a level direction.
+/// A row of photographs that were all rolled alike looks level to the cameras. Four that agree closely are believed,
+/// three are not, nor are five that only agree as far as the gate allows near the cameras' level, nor what is as near
+/// to a level direction.
 #[test]
 fn four_photographs_that_agree_closely_stand_upright_however_they_were_held() {
     for rolled_deg in [22.0, 30.0, 34.0] {
@@ -167,8 +174,8 @@ fn four_photographs_that_agree_closely_stand_upright_however_they_were_held() {
     }
 }
 
-/// Three upright lines in each of five photographs among forty that lie anyhow do not guide; the panorama leans by a third less all the same, in the mean
-/// of eight. What lies anyhow changes little.
+/// Three upright lines in each of five photographs among forty that lie anyhow do not guide; the panorama leans by a
+/// third less all the same, in the mean of eight. What lies anyhow changes little.
 #[test]
 fn a_few_upright_lines_level_what_they_cannot_guide() {
     let leans = |upright: usize| {

@@ -5,14 +5,14 @@
 //! small turn of every camera against the others:
 //!
 //! * Segments do not err independently. A line is found in pieces, and again in every photograph that shows it; the
-//!   frames of a facade's windows are as plumb as the facade. Sectors of the scene, not segments,
-//!   are what is left out in the jackknife that tells how far the vertical depends on chance. Where one thing fills several
-//!   sectors, leaving out one of them shows nothing; leaving out a photograph may: the jackknife over these is asked as well.
-//! * Upright and level lines may tell of different verticals, each of them sure of its own, as where pavements drain. What is open
-//!   between them (see `witnesses`) is asked as well.
-//! * Each of the three estimates the same variance from a few groups, and is now too small, now too large. Their mean counts: the largest of three is
-//!   nearly always too large. Where photographs agree on nothing and the frame of all lines together guides, the largest does: what
-//!   one of them cannot see is to be expected there.
+//!   frames of a facade's windows are as plumb as the facade. Sectors of the scene, not segments, are what is left out
+//!   in the jackknife that tells how far the vertical depends on chance. Where one thing fills several sectors, leaving
+//!   out one of them shows nothing; leaving out a photograph may: the jackknife over these is asked as well.
+//! * Upright and level lines may tell of different verticals, each of them sure of its own, as where pavements drain.
+//!   What is open between them (see `witnesses`) is asked as well.
+//! * Each of the three estimates the same variance from a few groups, and is now too small, now too large. Their mean
+//!   counts: the largest of three is nearly always too large. Where photographs agree on nothing and the frame of all
+//!   lines together guides, the largest does: what one of them cannot see is to be expected there.
 //! * Plumb lines are not plumb, level ones not level, lenses and focal lengths a little different from what was found,
 //!   alike in all sectors: no comparison of sectors shows that.
 //! * The turns of single cameras have what segments and overlaps leave open of them.
@@ -78,8 +78,8 @@ pub struct EstimatedRoll {
 /// four sectors of the scene.
 ///
 /// # Source
-/// Efron and Tibshirani, An Introduction to the Bootstrap, chapter 11 (jackknife, here over sectors, and over photographs); Student's t
-/// with one degree of freedom less than there are of these.
+/// Efron and Tibshirani, An Introduction to the Bootstrap, chapter 11 (jackknife, here over sectors, and over
+/// photographs); Student's t with one degree of freedom less than there are of these.
 pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRoll>>> {
     let scene = UprightScene::of(input)?;
     let vote = scene.vote(input);
@@ -185,7 +185,8 @@ impl UprightScene {
     }
 }
 
-/// That of a spread; `None` of fewer groups than tell anything. It is of the sectors, or photographs, that others are of.
+/// That of a spread; `None` of fewer groups than tell anything. It is of the sectors, or photographs, that others are
+/// of.
 fn scatter_of_spread(spread: &VerticalSpread) -> Option<AxisScatter> {
     let covariance = matrix_from_rows(&spread.covariance);
     (spread.groups >= MIN_GROUPS).then_some(AxisScatter { covariance, groups: spread.groups })
@@ -200,7 +201,8 @@ fn mean_scatter(first: AxisScatter, others: impl Iterator<Item = AxisScatter>) -
     AxisScatter { covariance: sum.covariance / count, ..sum }
 }
 
-/// The roll of a camera, which `rotation` takes the world to, and whose own turn has the covariance `turn`; the vertical has that of `scatter`.
+/// The roll of a camera, which `rotation` takes the world to, and whose own turn has the covariance `turn`; the
+/// vertical has that of `scatter`.
 fn estimated_roll(
     scatter: &AxisScatter,
     down: &Vector3<f64>,

@@ -21,8 +21,8 @@ fn scene(seed: u64) -> SyntheticScene {
     with_lines(SyntheticScene::new(Sweep::default(), world, 0.0, seed), 20, 0.5)
 }
 
-/// Of the true rolls 95 % are to lie within the intervals, which in the mean are no wider than a lean that is seen. With lines that guided and with lines that did
-/// not.
+/// Of the true rolls 95 % are to lie within the intervals, which in the mean are no wider than a lean that is seen.
+/// With lines that guided and with lines that did not.
 #[test]
 fn true_rolls_lie_within_the_intervals_as_often_as_these_say() {
     for method in [PriorMethod::VanishingPoints, PriorMethod::Straightening] {

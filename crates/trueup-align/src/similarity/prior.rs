@@ -46,8 +46,8 @@ pub struct Guidance {
     pub vertical_rivalry: Option<f64>,
     /// Share of the segments' weight that supports the vertical; `None` as above.
     pub vertical_share: Option<f64>,
-    /// Angle in radians between the vertical of the upright lines and the one that level lines imply, where these lie along a slope
-    /// and do not take part; `None` otherwise.
+    /// Angle in radians between the vertical of the upright lines and the one that level lines imply, where these lie
+    /// along a slope and do not take part; `None` otherwise.
     pub slope: Option<f64>,
     /// How far the vertical may be off by what upright and level lines say apart; `None` where these were not asked.
     pub spread: Option<VerticalSpread>,
@@ -79,8 +79,8 @@ impl VerticalSpread {
 }
 
 impl Guidance {
-    /// No line takes part in a prior of `count` photographs; `threshold` is the divergence that would be allowed, `level` what told of
-    /// the vertical.
+    /// No line takes part in a prior of `count` photographs; `threshold` is the divergence that would be allowed,
+    /// `level` what told of the vertical.
     pub(super) fn none(count: usize, threshold: f64, level: Vec<LevelEvidence>) -> Self {
         Self {
             used: false,

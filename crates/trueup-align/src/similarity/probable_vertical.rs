@@ -1,8 +1,9 @@
 //! The vertical that segments make probable where no direction of theirs is sure enough to guide.
 //!
-//! A few edges of a chart on a blank wall, a tower behind trees: too little for a frame of directions, and more than nothing. Every vertical near the
-//! expected one is as probable as cameras, gravity and horizon have it, times what the segments are as probable under it: a few of them stand upright, the
-//! others lie anyhow. The mean over all verticals errs least; where segments point nowhere in particular it is the expected one.
+//! A few edges of a chart on a blank wall, a tower behind trees: too little for a frame of directions, and more than
+//! nothing. Every vertical near the expected one is as probable as cameras, gravity and horizon have it, times what the
+//! segments are as probable under it: a few of them stand upright, the others lie anyhow. The mean over all verticals
+//! errs least; where segments point nowhere in particular it is the expected one.
 //!
 //! Level segments are not asked: all that lie along one slope err alike, and in nature most do.
 
@@ -16,15 +17,15 @@ use super::level::CameraLevel;
 use crate::vanishing::frame_search::{SEARCH_DEG, cone};
 use crate::vanishing::joint::{LineVote, Sight};
 
-/// Share of the segments that stand upright, for all that is known before they are seen. Reasoned; between 0.05 and 0.2 the same 62 cut sets without guiding lines lean
-/// alike to a tenth.
+/// Share of the segments that stand upright, for all that is known before they are seen. Reasoned; between 0.05 and 0.2
+/// the same 62 cut sets without guiding lines lean alike to a tenth.
 const UPRIGHT_SHARE: f64 = 0.1;
 /// Scale of how far what stands upright leans, degrees.
 const LEAN_DEG: f64 = 0.7;
 /// The same of how far a segment's ends lie aside, working pixels.
 const ENDS_PX: f64 = 0.5;
-/// What a segment tells beside others: edges are found in pieces, and again in every photograph that shows them. Of 0.15, 0.2, 0.3 and 0.33 the one under which the truth of
-/// ten cut sets with a few upright edges is the most probable.
+/// What a segment tells beside others: edges are found in pieces, and again in every photograph that shows them. Of
+/// 0.15, 0.2, 0.3 and 0.33 the one under which the truth of ten cut sets with a few upright edges is the most probable.
 const INDEPENDENT: f64 = 0.2;
 /// Segments that are asked, shared out evenly among the photographs, the longest first.
 const MAX_SEGMENTS: usize = 1200;
@@ -32,7 +33,8 @@ const MAX_SEGMENTS: usize = 1200;
 const STEP_DEG: f64 = 1.0;
 /// Steps that a step is divided into around verticals that are not improbable, to either side.
 const FINER: i32 = 2;
-/// A vertical is improbable whose logarithm is so much smaller than that of the most probable one: all of them together hardly count.
+/// A vertical is improbable whose logarithm is so much smaller than that of the most probable one: all of them together
+/// hardly count.
 const IMPROBABLE: f64 = 12.0;
 
 /// A vertical and how sure it is.
@@ -89,14 +91,16 @@ fn around(down: &Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> + use<> {
 
 /// The logarithm of how much more probable the segments' leans are if the vertical is `down` than if they lie anyhow.
 ///
-/// The lean is the angle in the picture between a segment and the vertical at its middle, which lies anywhere in half a turn. Of those that stand upright it has Student's t
-/// distribution with three degrees of freedom: now and then one leans far.
+/// The lean is the angle in the picture between a segment and the vertical at its middle, which lies anywhere in half a
+/// turn. Of those that stand upright it has Student's t distribution with three degrees of freedom: now and then one
+/// leans far.
 fn log_likelihood(sights: &[Sight], down: &Vector3<f64>) -> f64 {
     /// Factors of moderate size that a number holds the product of: a logarithm for each would take most of the time.
     const PRODUCTS: usize = 64;
     let ratio = |sight: &Sight| {
         let scale = LEAN_DEG.to_radians().hypot(ENDS_PX / sight.length_px);
-        // The square of the lean's sine. Toward the vertical itself everything is upright, and a quotient of zeros is no number: `min` has 1.
+        // The square of the lean's sine. Toward the vertical itself everything is upright, and a quotient of zeros is
+        // no number: `min` has 1.
         let square = (sight.normal.dot(down).powi(2) / (1.0 - sight.toward.dot(down).powi(2))).min(1.0);
         let density = 2.0 / (PI * scale) / (1.0 + square / (scale * scale)).powi(2);
         1.0 - UPRIGHT_SHARE + UPRIGHT_SHARE * PI * density
@@ -114,8 +118,9 @@ mod tests {
         Sight { normal: Vector3::new(cosine, sine, 0.0), toward: Vector3::z(), length_px: 100.0 }
     }
 
-    /// By hand: the scale is the root of (0.7 degrees)^2 + (0.5 / 100)^2, 0.013201. An upright segment is 0.9 + 0.1 x 2 / 0.013201 = 16.05 times as probable, one that leans by
-    /// 2 degrees 0.9 + 15.15 / (1 + 0.001218 / 0.00017427)^2 = 1.1374 times, a level one 0.9 times.
+    /// By hand: the scale is the root of (0.7 degrees)^2 + (0.5 / 100)^2, 0.013201. An upright segment is 0.9 + 0.1 x 2
+    /// / 0.013201 = 16.05 times as probable, one that leans by 2 degrees 0.9 + 15.15 / (1 + 0.001218 / 0.00017427)^2 =
+    /// 1.1374 times, a level one 0.9 times.
     #[test]
     fn a_segment_tells_by_how_far_it_leans() {
         for (lean_deg, expected) in [(0.0, 16.05_f64), (2.0, 1.1374), (90.0, 0.9)] {

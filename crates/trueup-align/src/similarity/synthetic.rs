@@ -116,7 +116,8 @@ impl SyntheticScene {
         run(&self.input(&VanishingOptions::default()), options, &StageContext::default()).expect("a well-formed scene")
     }
 
-    /// The same with all level lines along a slope: of the 20 of each of three directions, of which the second is the vertical, those of the others.
+    /// The same with all level lines along a slope: of the 20 of each of three directions, of which the second is the
+    /// vertical, those of the others.
     pub(crate) fn on_a_slope(&self, slope_deg: f64) -> Self {
         let mut sloping = self.clone();
         let mut generator = StageContext::default().generator("slope", 0);

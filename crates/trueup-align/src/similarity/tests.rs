@@ -364,8 +364,8 @@ fn recorded_gravity(scene: &SyntheticScene, noise_deg: f64, seed: u64) -> Vec<Op
     scene.world_from_camera.iter().map(of).collect()
 }
 
-/// Eight photographs that look up and lean by 8 degrees, of a scene without lines: straightening is off by degrees, gravity that is off by 1.5
-/// degrees in each is not; lines that are seen outweigh both.
+/// Eight photographs that look up and lean by 8 degrees, of a scene without lines: straightening is off by degrees,
+/// gravity that is off by 1.5 degrees in each is not; lines that are seen outweigh both.
 #[test]
 fn recorded_gravity_levels_what_has_no_lines() {
     let vanishing = VanishingOptions::default();
@@ -394,8 +394,8 @@ fn recorded_gravity_levels_what_has_no_lines() {
     assert!(mean(&with_both) < 0.25, "{with_both:?}");
 }
 
-/// All photographs lie on their sides, because a program lost their orientation: gravity stands them up, and the lines of the scene make it
-/// exact.
+/// All photographs lie on their sides, because a program lost their orientation: gravity stands them up, and the lines
+/// of the scene make it exact.
 #[test]
 fn photographs_on_their_sides_are_stood_up_by_gravity() {
     let vanishing = VanishingOptions::default();

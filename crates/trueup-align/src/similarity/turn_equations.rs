@@ -1,9 +1,10 @@
 //! Turns of single cameras whose mean is zero: what segments and overlaps ask of them, and what these leave open.
 //!
-//! Minimizes sum_i w_i^T N_i w_i - 2 r_i^T w_i plus sum over overlaps of (w_i - w_j)^T information (w_i - w_j), subject to
-//! sum_i c_i w_i = 0: in this mean those cameras count of which segments tell something, so that the others need not turn
-//! against them to even out what they are asked. The overlaps tie each photograph to a few others, the condition all to one another: with its multipliers it is
-//! eliminated by blocks, and so is the first photograph, without which the others cannot turn together unseen.
+//! Minimizes sum_i w_i^T N_i w_i - 2 r_i^T w_i plus sum over overlaps of (w_i - w_j)^T information (w_i - w_j), subject
+//! to sum_i c_i w_i = 0: in this mean those cameras count of which segments tell something, so that the others need not
+//! turn against them to even out what they are asked. The overlaps tie each photograph to a few others, the condition
+//! all to one another: with its multipliers it is eliminated by blocks, and so is the first photograph, without which
+//! the others cannot turn together unseen.
 
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::Llt;
@@ -12,12 +13,15 @@ use rayon::prelude::*;
 
 use super::block_matrix::BlockMatrix;
 
-/// Information, 1 / rad^2, that keeps turns where neither segments nor overlaps say anything: far less than either says.
+/// Information, 1 / rad^2, that keeps turns where neither segments nor overlaps say anything: far less than either
+/// says.
 const HOLD: f64 = 1.0;
-/// What segments tell of a photograph's turn for it to count in the mean of all turns, as a share of what they tell of one in the mean. Counted by what they tell,
-/// ten rendered streets with parallax lean by 0.145 degrees in the mean instead of 0.130.
+/// What segments tell of a photograph's turn for it to count in the mean of all turns, as a share of what they tell of
+/// one in the mean. Counted by what they tell, ten rendered streets with parallax lean by 0.145 degrees in the mean
+/// instead of 0.130.
 const ENOUGH: f64 = 0.05;
-/// Photographs whose columns of the inverse are found at once. A number of its own, so that the sums are the same for any number of threads.
+/// Photographs whose columns of the inverse are found at once. A number of its own, so that the sums are the same for
+/// any number of threads.
 const AT_ONCE: usize = 16;
 
 /// How sure an overlap is of the relative rotation of two cameras.
@@ -33,15 +37,16 @@ pub(super) struct RelativeCertainty {
 pub(super) struct TurnEquations {
     /// Of all photographs but the first.
     others: Llt<usize, f64>,
-    /// What `others` solves the columns for that couple these with the first photograph and with the multipliers: three unknowns each, in three rows a photograph.
+    /// What `others` solves the columns for that couple these with the first photograph and with the multipliers: three
+    /// unknowns each, in three rows a photograph.
     along: Vec<SMatrix<f64, 3, 6>>,
     /// The inverse of what is left for the first photograph and the multipliers.
     last: Matrix6<f64>,
 }
 
 impl TurnEquations {
-    /// The factor of the equations with `normals`, N_i of every photograph, and `overlaps`; `None` if they leave something
-    /// undetermined or do not fit into memory.
+    /// The factor of the equations with `normals`, N_i of every photograph, and `overlaps`; `None` if they leave
+    /// something undetermined or do not fit into memory.
     pub(super) fn new(normals: &[Matrix3<f64>], overlaps: &[RelativeCertainty]) -> Option<Self> {
         let count = normals.len().checked_sub(1).filter(|&others| others > 0)?;
         let shares = shares(normals);
@@ -120,7 +125,8 @@ impl TurnEquations {
     }
 }
 
-/// What each photograph counts in the mean of all turns, c_i: 1 if the trace of N_i is at least [`ENOUGH`] of the mean trace, else 0.
+/// What each photograph counts in the mean of all turns, c_i: 1 if the trace of N_i is at least [`ENOUGH`] of the mean
+/// trace, else 0.
 fn shares(normals: &[Matrix3<f64>]) -> Vec<f64> {
     let enough = ENOUGH * normals.iter().map(Matrix3::trace).sum::<f64>() / normals.len() as f64;
     normals.iter().map(|normal| if normal.trace() >= enough { 1.0 } else { 0.0 }).collect()
@@ -198,7 +204,8 @@ mod tests {
         }
     }
 
-    /// Of traces of 600, 14, 13 and 441, the mean is 267, of which a twentieth is 13.35; where segments tell nothing, all count.
+    /// Of traces of 600, 14, 13 and 441, the mean is 267, of which a twentieth is 13.35; where segments tell nothing,
+    /// all count.
     #[test]
     fn photographs_count_from_a_twentieth_of_the_mean_on() {
         let of = |traces: [f64; 4]| shares(&traces.map(|trace| Matrix3::from_diagonal(&Vector3::new(trace, 0.0, 0.0))));
@@ -206,8 +213,9 @@ mod tests {
         assert_eq!(of([0.0; 4]), [1.0; 4]);
     }
 
-    /// By hand: three photographs in a row, of which the first two show segments that ask for turns of 0.02 and 0.01; the mean of both is taken off, and the third
-    /// follows the second. With turns that sum to zero the third would be turned by 0.03 to the other side.
+    /// By hand: three photographs in a row, of which the first two show segments that ask for turns of 0.02 and 0.01;
+    /// the mean of both is taken off, and the third follows the second. With turns that sum to zero the third would be
+    /// turned by 0.03 to the other side.
     #[test]
     fn a_camera_without_segments_follows_those_that_it_overlaps() {
         let normals = [Matrix3::identity() * 1e8, Matrix3::identity() * 1e8, Matrix3::zeros()];

@@ -85,7 +85,8 @@ fn neighbors(photographs: usize, turns: &[TurnTerm]) -> Vec<Vec<(usize, f64)>> {
 ///
 /// # Departures
 /// What predicts theta_j - theta_i has the opposite sign, since R_i takes the world to the camera; and the twist is the
-/// difference of upright rolls only for level cameras: two level cameras at pitch p that pan by y twist by about y sin p.
+/// difference of upright rolls only for level cameras: two level cameras at pitch p that pan by y twist by about y sin
+/// p.
 fn printed_twist(rotation_i: &Matrix3<f64>, rotation_j: &Matrix3<f64>) -> f64 {
     let relative = rotation_j * rotation_i.transpose();
     (relative[(1, 0)] - relative[(0, 1)]).atan2(relative[(0, 0)] + relative[(1, 1)])

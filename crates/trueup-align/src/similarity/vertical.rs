@@ -14,8 +14,8 @@ const MIN_SINE: f64 = 0.258_819_045_102_520_74;
 ///
 /// # Departures
 /// The paper takes, in the reference camera's frame, the nearest world axis (eq. 5), without signs or a one-to-one
-/// rule; that fails for steep references. Here: the direction by which all cameras are most probably held, little rolled but for some that were turned on
-/// purpose, and about level. No reference takes part.
+/// rule; that fails for steep references. Here: the direction by which all cameras are most probably held, little
+/// rolled but for some that were turned on purpose, and about level. No reference takes part.
 pub(super) fn vertical_of(frame: &Matrix3<f64>, rotations: &[Matrix3<f64>]) -> Vector3<f64> {
     let improbabilities: [f64; 3] = std::array::from_fn(|k| improbability(&frame.column(k).into_owned(), rotations));
     let order = |&a: &usize, &b: &usize| improbabilities[a].total_cmp(&improbabilities[b]);
@@ -35,7 +35,8 @@ pub(super) fn vertical_near(frame: &Matrix3<f64>, expected: &Vector3<f64>) -> Ve
 ///
 /// # Departures
 /// The paper takes for each direction the nearest of the world's axes, which heeds no sign and may take one axis twice,
-/// so that its M has no inverse; here one axis goes to one direction, whatever its sign, for the largest sum of cosines.
+/// so that its M has no inverse; here one axis goes to one direction, whatever its sign, for the largest sum of
+/// cosines.
 pub(super) fn vertical_by_reference(frame: &Matrix3<f64>, reference: &Matrix3<f64>) -> Vector3<f64> {
     // The world's axes are those of the reference camera.
     let (down, _) = match_triad(&reference.transpose(), frame);
@@ -55,8 +56,9 @@ mod tests {
 
     use super::*;
 
-    /// Two photographs of a wall, one turned by 45 degrees: the depth of the scene is orthogonal to both x axes, and no vertical. By hand: the
-    /// vertical's x is 0 and sin 45 degrees, so that its mean sin^2 is 1/4; that of the horizontal is 3/4.
+    /// Two photographs of a wall, one turned by 45 degrees: the depth of the scene is orthogonal to both x axes, and no
+    /// vertical. By hand: the vertical's x is 0 and sin 45 degrees, so that its mean sin^2 is 1/4; that of the
+    /// horizontal is 3/4.
     #[test]
     fn the_line_of_sight_is_no_vertical() {
         let rotations = [rotation_about_y(-0.1), rotation_about_z(45_f64.to_radians()) * rotation_about_y(0.1)];
@@ -64,8 +66,8 @@ mod tests {
         assert!(down.angle(&Vector3::y()) < 1e-12, "{down}");
     }
 
-    /// One of two photographs is turned by a quarter, so that both rolls are as probable; by the depth of the scene as vertical they would look up by 70 and
-    /// 45 degrees.
+    /// One of two photographs is turned by a quarter, so that both rolls are as probable; by the depth of the scene as
+    /// vertical they would look up by 70 and 45 degrees.
     #[test]
     fn of_photographs_turned_against_each_other_those_that_look_level_tell() {
         for turned_deg in [-90.0_f64, -75.0, 75.0, 90.0] {

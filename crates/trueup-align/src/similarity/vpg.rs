@@ -25,8 +25,9 @@ use crate::vanishing::jackknife::{covariance_by_photographs, covariance_by_secto
 use crate::vanishing::joint::{self, AxisWeights, LineVote, Refinement};
 use crate::vanishing::{InterpretationPlanes, RefinedTriad};
 
-/// Fewest photographs whose level lines may be found to lie along a slope: of two, nothing but the few sectors they show tells how upright and level
-/// lines scatter. By a model of this on the segments of cut sets, the mean lean of 164 pairs is the same either way, that of 145 triples 0.26 degrees with it and 0.30 without.
+/// Fewest photographs whose level lines may be found to lie along a slope: of two, nothing but the few sectors they
+/// show tells how upright and level lines scatter. By a model of this on the segments of cut sets, the mean lean of 164
+/// pairs is the same either way, that of 145 triples 0.26 degrees with it and 0.30 without.
 const MIN_SLOPING_PHOTOGRAPHS: usize = 3;
 /// How probable it is that level lines lie along a slope, where they are not heard at all.
 const SLOPING: f64 = 0.5;
@@ -37,13 +38,15 @@ const MAX_REFINEMENT_TOLERANCES: f64 = 2.0;
 /// Root mean square misorientation of the photographs' directions that is detection noise, degrees; beyond, the
 /// horizontal directions lose weight in the joint refinement.
 const ORDINARY_MISORIENTATION_DEG: f64 = 1.0;
-/// Least share of the information on the vertical that makes lines its guide; with less they are one voice among others.
+/// Least share of the information on the vertical that makes lines its guide; with less they are one voice among
+/// others.
 const GUIDING_SHARE: f64 = 0.5;
-/// Largest standard deviation of the vertical at which lines guide, degrees: so few photographs have lines beyond that what their scatter says of
-/// single cameras is little; and wrong frames that stand out by chance in the pooled search scatter by more. Reasoned.
+/// Largest standard deviation of the vertical at which lines guide, degrees: so few photographs have lines beyond that
+/// what their scatter says of single cameras is little; and wrong frames that stand out by chance in the pooled search
+/// scatter by more. Reasoned.
 const MAX_GUIDING_DEVIATION_DEG: f64 = 3.0;
-/// Lines whose vertical is farther than this from the one that cameras recorded are not those of what stands upright, degrees, unless
-/// both are less certain. Reasoned: no sensor errs by as much, and roofs lean by more.
+/// Lines whose vertical is farther than this from the one that cameras recorded are not those of what stands upright,
+/// degrees, unless both are less certain. Reasoned: no sensor errs by as much, and roofs lean by more.
 const MAX_GRAVITY_ANGLE_DEG: f64 = 5.0;
 /// The same in deviations of both.
 const MAX_GRAVITY_DEVIATIONS: f64 = 4.0;
@@ -152,8 +155,9 @@ impl<'a> SceneDirections<'a> {
         }
     }
 
-    /// About which vertical frames are sought of all lines together: the cameras', unless the vertical of `dominant` is out of reach from there and
-    /// the cameras know so little that it may be theirs, as of two photographs of which one lies on its side, or more than very few agree closely.
+    /// About which vertical frames are sought of all lines together: the cameras', unless the vertical of `dominant` is
+    /// out of reach from there and the cameras know so little that it may be theirs, as of two photographs of which one
+    /// lies on its side, or more than very few agree closely.
     fn searched_about(&self, dominant: &Dominant) -> Vector3<f64> {
         let own = self.vertical(&dominant.frame);
         let agreement = match self.agreement(dominant) {
@@ -235,12 +239,14 @@ impl<'a> SceneDirections<'a> {
         failed_clause(&evidence, self.options)
     }
 
-    /// How many deviations of what is known without lines `down` lies from there, where too few photographs show lines along it; level ones alone may be those of a slope.
+    /// How many deviations of what is known without lines `down` lies from there, where too few photographs show lines
+    /// along it; level ones alone may be those of a slope.
     pub(super) fn by_level_lines(&self, down: &Vector3<f64>) -> Option<f64> {
         (self.vote.photographs_along(down) < MIN_UPRIGHT_PHOTOGRAPHS).then(|| self.level.deviations_to(down))
     }
 
-    /// The prior of accepted dominant directions; where they are not sure enough to guide, the vertical that they take part in.
+    /// The prior of accepted dominant directions; where they are not sure enough to guide, the vertical that they take
+    /// part in.
     pub(super) fn solve_dominant(
         &mut self,
         mut dominant: Dominant,
@@ -293,9 +299,10 @@ impl<'a> SceneDirections<'a> {
         Ok(self.solve(&down, &own, rotations, guidance))
     }
 
-    /// Covariance of the vertical, column `vertical` of a frame that lines refined, rad^2, by asking different photographs; or without one
-    /// sector of the scene each, where that is beyond what may guide: then all photographs know it from one and the same thing. What is
-    /// `reconciled` knows that already. Of a frame of all lines together (`pooled`) the larger counts in any case: single photographs agree on nothing.
+    /// Covariance of the vertical, column `vertical` of a frame that lines refined, rad^2, by asking different
+    /// photographs; or without one sector of the scene each, where that is beyond what may guide: then all photographs
+    /// know it from one and the same thing. What is `reconciled` knows that already. Of a frame of all lines together
+    /// (`pooled`) the larger counts in any case: single photographs agree on nothing.
     fn covariance(
         &self,
         refinement: Refinement<'_>,
@@ -318,8 +325,8 @@ impl<'a> SceneDirections<'a> {
         by_sectors.filter(counts).unwrap_or(by_photographs)
     }
 
-    /// The vertical of lines weighed against what else is known of it; an error with that vertical if lines do not guide it, with the
-    /// failed clause. `covariance` is the lines', rad^2, by asking different photographs.
+    /// The vertical of lines weighed against what else is known of it; an error with that vertical if lines do not
+    /// guide it, with the failed clause. `covariance` is the lines', rad^2, by asking different photographs.
     fn weighed(
         &self,
         lines: &Vector3<f64>,
@@ -483,8 +490,8 @@ impl<'a> SceneDirections<'a> {
     }
 }
 
-/// The directions of a frame in the order and with the signs that bring them closest to the axes of the `reference` camera, so that
-/// neither depends on which of many equal hypotheses came first; a rotation.
+/// The directions of a frame in the order and with the signs that bring them closest to the axes of the `reference`
+/// camera, so that neither depends on which of many equal hypotheses came first; a rotation.
 fn in_order(frame: &Matrix3<f64>, reference: &Matrix3<f64>) -> Matrix3<f64> {
     let (mut ordered, _) = match_triad(&reference.transpose(), frame);
     if ordered.determinant() < 0.0 {
@@ -500,9 +507,9 @@ fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix3<f64> {
     axis.try_normalize(f64::EPSILON).map_or_else(Matrix3::identity, |axis| exp_rotation(&(axis * angle)))
 }
 
-/// Full weight for the vertical; for the horizontals as much as the photographs' directions agree: where buildings stand
-/// at several angles, what passes for one horizontal direction would pull the vertical along. None where they lie along a slope. `down` is the frame's
-/// vertical.
+/// Full weight for the vertical; for the horizontals as much as the photographs' directions agree: where buildings
+/// stand at several angles, what passes for one horizontal direction would pull the vertical along. None where they lie
+/// along a slope. `down` is the frame's vertical.
 pub(super) fn axis_weights(frame: &Matrix3<f64>, down: &Vector3<f64>, guidance: &Guidance) -> AxisWeights {
     let horizontal = if guidance.slope.is_some() { 0.0 } else { horizontal_agreement(guidance) };
     AxisWeights::new(column_near(frame, down), 1.0, horizontal)
@@ -510,7 +517,8 @@ pub(super) fn axis_weights(frame: &Matrix3<f64>, down: &Vector3<f64>, guidance: 
 
 /// How far photographs agree on the horizontal directions, from 0 to 1.
 fn horizontal_agreement(guidance: &Guidance) -> f64 {
-    // It is known by the lines of all photographs together, the level ones among them, and not by what single photographs say.
+    // It is known by the lines of all photographs together, the level ones among them, and not by what single
+    // photographs say.
     if guidance.pooled {
         return 1.0;
     }

@@ -1,9 +1,10 @@
 //! What upright and level lines of a scene say of its vertical, each by how sure it is.
 //!
-//! Floors, window sills and eaves are level; pavements drain, streets climb, and the lines along them vanish below or above the
-//! horizon. Together with the upright lines they make a frame of right angles that leans by as much as they slope; it may agree with itself in every photograph,
-//! so that nothing but upright and level lines heard apart shows it. Each gives a vertical with a covariance. How far these contradict each other says
-//! how probable a slope is, and, whatever is taken for the vertical, how far it may be off.
+//! Floors, window sills and eaves are level; pavements drain, streets climb, and the lines along them vanish below or
+//! above the horizon. Together with the upright lines they make a frame of right angles that leans by as much as they
+//! slope; it may agree with itself in every photograph, so that nothing but upright and level lines heard apart shows
+//! it. Each gives a vertical with a covariance. How far these contradict each other says how probable a slope is, and,
+//! whatever is taken for the vertical, how far it may be off.
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use trueup_core::geometry::orthonormal_complement;
@@ -14,13 +15,15 @@ use crate::vanishing::jackknife::{
 use crate::vanishing::joint::{AxisWeights, LineVote, Refinement, TOLERANCE_DEG};
 use crate::vanishing::supporters::BUILT_DEVIATION_DEG;
 
-/// [`BUILT_DEVIATION_DEG`] for lines along a slope, degrees. Reasoned: pavements drain by 1 to 2 degrees, streets and ramps climb by up to 6.
+/// [`BUILT_DEVIATION_DEG`] for lines along a slope, degrees. Reasoned: pavements drain by 1 to 2 degrees, streets and
+/// ramps climb by up to 6.
 const SLOPE_SPREAD_DEG: f64 = 3.0;
 /// Share of scenes whose level lines lie along a slope. Reasoned.
 const SLOPING_SHARE: f64 = 0.2;
 /// Fewest photographs that must show upright lines, three each, to be heard beside the level ones.
 pub(super) const MIN_UPRIGHT_PHOTOGRAPHS: usize = 2;
-/// Farthest that a vertical of upright lines may lie from the frame they were sought near, in tolerances of a segment's vote: others found another direction.
+/// Farthest that a vertical of upright lines may lie from the frame they were sought near, in tolerances of a segment's
+/// vote: others found another direction.
 const MAX_DISTANCE_TOLERANCES: f64 = 2.0;
 
 /// A vertical of upright and level lines together.
@@ -56,8 +59,9 @@ struct Weighed {
     sloping: f64,
 }
 
-/// What the upright and the level lines near `frame`, whose column `vertical` is the vertical, say together. `agreement`, from 0 to 1, is the weight of
-/// level lines, as far as photographs agree on their directions: where buildings stand at several angles, what passes for one of them says less.
+/// What the upright and the level lines near `frame`, whose column `vertical` is the vertical, say together.
+/// `agreement`, from 0 to 1, is the weight of level lines, as far as photographs agree on their directions: where
+/// buildings stand at several angles, what passes for one of them says less.
 ///
 /// `None` where level lines have no weight, or upright lines are in too few photographs.
 pub(super) fn reconciled(vote: &LineVote, frame: &Matrix3<f64>, vertical: usize, agreement: f64) -> Option<Reconciled> {
@@ -97,16 +101,16 @@ pub(super) fn reconciled(vote: &LineVote, frame: &Matrix3<f64>, vertical: usize,
     finite.then_some(Reconciled { vertical, covariance, groups, upright, angle, sloping: weighed.sloping, is_narrow })
 }
 
-/// Covariance in rad^2 of the `vertical` that level lines imply, by what they may slope: what they add to their scatter where no upright lines are heard beside
-/// them.
+/// Covariance in rad^2 of the `vertical` that level lines imply, by what they may slope: what they add to their scatter
+/// where no upright lines are heard beside them.
 pub(super) fn covariance_of_slopes(vertical: &Vector3<f64>) -> Matrix3<f64> {
     let square = |deviation_deg: f64| deviation_deg.to_radians().powi(2);
     let variance = (1.0 - SLOPING_SHARE) * square(BUILT_DEVIATION_DEG) + SLOPING_SHARE * square(SLOPE_SPREAD_DEG);
     (Matrix3::identity() - vertical * vertical.transpose()) * variance
 }
 
-/// Scatter of column `axis` of a refined frame by leaving out one sector of the scene each; where lines are in too few of these, one
-/// photograph each, and whether they are. `None` with a single photograph.
+/// Scatter of column `axis` of a refined frame by leaving out one sector of the scene each; where lines are in too few
+/// of these, one photograph each, and whether they are. `None` with a single photograph.
 fn scatter(vote: &LineVote, refinement: Refinement<'_>, axis: usize) -> Option<(AxisScatter, bool)> {
     let by_sectors = without_each_sector(vote, refinement, axis);
     let is_narrow = by_sectors.len() < MIN_SECTORS;
@@ -114,8 +118,9 @@ fn scatter(vote: &LineVote, refinement: Refinement<'_>, axis: usize) -> Option<(
     AxisScatter::of(&frames, axis).map(|scatter| (scatter, is_narrow))
 }
 
-/// The mean of two normal distributions: that level lines are level, and that they lie along a slope. Each has the place of least squares, and is as probable as
-/// the says' distance from each other makes it. `agreement` divides the level lines' variance. `None` where that cannot be told.
+/// The mean of two normal distributions: that level lines are level, and that they lie along a slope. Each has the
+/// place of least squares, and is as probable as the says' distance from each other makes it. `agreement` divides the
+/// level lines' variance. `None` where that cannot be told.
 fn weighed(upright: &Say, level: &Say, agreement: f64) -> Option<Weighed> {
     let variance = |deviation_deg: f64| Matrix2::identity() * deviation_deg.to_radians().powi(2);
     let upright = Say { covariance: upright.covariance + variance(SCENE_DEVIATION_DEG), ..*upright };
@@ -150,9 +155,10 @@ mod tests {
         Say { place: Vector2::new(x_deg.to_radians(), 0.0), covariance }
     }
 
-    /// By hand, where both are sure: with 0.04 degrees that all lines err by alike, variances are 0.0416 and 9.0016, and 0.2 / 9.0016 exp(-d^2 / 18.0032)
-    /// is beyond 0.8 / 0.0416 exp(-d^2 / 0.0832) from d^2 (12.019 - 0.0555) = ln 865.5, d = 0.7519 degrees. With deviations of 1 degree each, variances are
-    /// 2.04 and 11: d^2 (0.2451 - 0.04545) = ln (0.8 x 11 / (0.2 x 2.04)) = 3.071, d = 3.922 degrees.
+    /// By hand, where both are sure: with 0.04 degrees that all lines err by alike, variances are 0.0416 and 9.0016,
+    /// and 0.2 / 9.0016 exp(-d^2 / 18.0032) is beyond 0.8 / 0.0416 exp(-d^2 / 0.0832) from d^2 (12.019 - 0.0555) = ln
+    /// 865.5, d = 0.7519 degrees. With deviations of 1 degree each, variances are 2.04 and 11: d^2 (0.2451 - 0.04545) =
+    /// ln (0.8 x 11 / (0.2 x 2.04)) = 3.071, d = 3.922 degrees.
     #[test]
     fn level_lines_are_of_a_slope_where_they_contradict_the_upright_ones() {
         let slopes = |angle_deg: f64, deviation_deg: f64| {
@@ -163,9 +169,10 @@ mod tests {
         assert!(!slopes(0.1, 1e9));
     }
 
-    /// By hand: variances of 0.2^2 + 0.04^2 = 0.0416 of the upright lines and 0.4^2 + 0.2^2 = 0.2 of the level ones put the mean at 0.0416 / 0.2416 of
-    /// 0.1 degrees, 0.0172, and leave 0.0416 x 0.2 / 0.2416 = 0.0344 square degrees. A slope is 0.25 x 0.2416 / 9.2016 x exp(0.005 x 4.030) = 0.0067
-    /// times as probable, and moves either by less than a hundredth.
+    /// By hand: variances of 0.2^2 + 0.04^2 = 0.0416 of the upright lines and 0.4^2 + 0.2^2 = 0.2 of the level ones put
+    /// the mean at 0.0416 / 0.2416 of 0.1 degrees, 0.0172, and leave 0.0416 x 0.2 / 0.2416 = 0.0344 square degrees. A
+    /// slope is 0.25 x 0.2416 / 9.2016 x exp(0.005 x 4.030) = 0.0067 times as probable, and moves either by less than a
+    /// hundredth.
     #[test]
     fn upright_and_level_lines_are_weighed_by_their_variances() {
         let weighed = weighed(&say(0.0, 0.2), &say(0.1, 0.4), 1.0).expect("finite");
@@ -175,8 +182,9 @@ mod tests {
         assert!((place - 0.0172).abs() < 2e-4 && (variance - 0.0344).abs() < 1e-4, "{place} {variance}");
     }
 
-    /// By hand: of variances 0.0916 and 0.0425 about the same place, a slope all but excluded, sqrt(0.0916 x 0.0425 / 0.1341) = 0.170 degrees are left. A degree
-    /// apart, a slope has a probability of 0.127, its mean lies 0.67 degrees from the other, and 0.295 are left; at 6 degrees nothing but the upright lines, with 0.301.
+    /// By hand: of variances 0.0916 and 0.0425 about the same place, a slope all but excluded, sqrt(0.0916 x 0.0425 /
+    /// 0.1341) = 0.170 degrees are left. A degree apart, a slope has a probability of 0.127, its mean lies 0.67 degrees
+    /// from the other, and 0.295 are left; at 6 degrees nothing but the upright lines, with 0.301.
     #[test]
     fn what_is_open_widens_the_covariance() {
         let variance = |angle_deg: f64| {
@@ -188,7 +196,8 @@ mod tests {
         }
     }
 
-    /// A square that drains: its joints climb by 2.5 degrees toward the building, whose edges are plumb. Three photographs know it as well as eight.
+    /// A square that drains: its joints climb by 2.5 degrees toward the building, whose edges are plumb. Three
+    /// photographs know it as well as eight.
     #[test]
     fn lines_along_a_slope_do_not_tilt_the_vertical() {
         const SLOPE_DEG: f64 = 2.5;

@@ -1,9 +1,10 @@
 //! A stitch graph written by hand.
 //!
-//! Two notations are read, line by line; `#` at the start of a line, or behind a space, starts a comment, unless the names of photographs go on there:
+//! Two notations are read, line by line; `#` at the start of a line, or behind a space, starts a comment, unless the
+//! names of photographs go on there:
 //!
-//! * `NAME -- NAME` or `INDEX -- INDEX`: the two photographs overlap. Names are file names, with as many of the folders they lie in as tell them from
-//!   others; indices count from 0 in the order in which the photographs were given.
+//! * `NAME -- NAME` or `INDEX -- INDEX`: the two photographs overlap. Names are file names, with as many of the folders
+//!   they lie in as tell them from others; indices count from 0 in the order in which the photographs were given.
 //! * `{key | value | comment}` as in the graph files of the GSP data sets: `matching_graph_image_edges-I` lists the
 //!   neighbors of photograph I, `center_image_index` names the reference, `center_image_rotation_angle` its rotation in
 //!   degrees; `images_count` must fit the photographs given.
@@ -30,8 +31,8 @@ pub struct GraphFile {
 /// Reads a graph for the photographs at these paths, in the order given. `file` is the file's name, for messages.
 ///
 /// # Errors
-/// [`Error::Input`] with the line number for unknown photographs, names of several, unreadable lines, a wrong photograph count, a
-/// photograph joined to itself, or a file without any pair.
+/// [`Error::Input`] with the line number for unknown photographs, names of several, unreadable lines, a wrong
+/// photograph count, a photograph joined to itself, or a file without any pair.
 pub fn parse_graph_file(text: &str, photographs: &[&Path], file: &str) -> Result<GraphFile> {
     let mut graph = GraphFile::default();
     // Editors of some systems begin a text with a mark of its byte order, which is no part of the first name.
@@ -58,7 +59,8 @@ pub fn parse_graph_file(text: &str, photographs: &[&Path], file: &str) -> Result
     Ok(graph)
 }
 
-/// A line as it stands, and cut before each of its comments, the shortest first: names may have the mark of a comment, too.
+/// A line as it stands, and cut before each of its comments, the shortest first: names may have the mark of a comment,
+/// too.
 fn with_and_without_comment(line: &str) -> impl Iterator<Item = &str> {
     let is_comment = move |&(at, _): &(usize, &str)| line[..at].ends_with(char::is_whitespace);
     let cut = line.match_indices(COMMENT).filter(is_comment).map(move |(at, _)| line[..at].trim_end());
@@ -84,8 +86,8 @@ fn read_line(line: &str, photographs: &[&Path], graph: &mut GraphFile) -> std::r
     }
 }
 
-/// The pair of a line. Names may have the mark between the two in them as well: it is where both sides name photographs, most likely where spaces
-/// are about it.
+/// The pair of a line. Names may have the mark between the two in them as well: it is where both sides name
+/// photographs, most likely where spaces are about it.
 fn pair_line(line: &str, photographs: &[&Path]) -> std::result::Result<(usize, usize), String> {
     let marks = |mark: &'static str| {
         let starts = line.char_indices().filter(move |&(at, _)| line[at..].starts_with(mark));

@@ -34,15 +34,16 @@ const STEP_DEG: f64 = 2.0;
 /// the 130 sets of the gate's experiment and on real sets.
 pub(crate) const GUIDING_SIGNIFICANCE: f64 = 7.0;
 
-/// Verticals whose best frames are refined: within the search's step and tolerance, few segments fit as well elsewhere as at the best. Measured: on cut
-/// sets of a room with one blank wall the first alone ended beside the best one once in nine, the first four never.
+/// Verticals whose best frames are refined: within the search's step and tolerance, few segments fit as well elsewhere
+/// as at the best. Measured: on cut sets of a room with one blank wall the first alone ended beside the best one once
+/// in nine, the first four never.
 const REFINED: usize = 8;
 
 /// The best frames, and how far the first stands out.
 #[derive(Debug, Clone)]
 pub(crate) struct PooledFrames {
-    /// The best frame of each of the best verticals tried, the best first. Columns are the directions in the common frame, the vertical
-    /// first; rotations.
+    /// The best frame of each of the best verticals tried, the best first. Columns are the directions in the common
+    /// frame, the vertical first; rotations.
     starts: Vec<Matrix3<f64>>,
     /// Score of the first.
     best: f64,
@@ -51,15 +52,16 @@ pub(crate) struct PooledFrames {
 }
 
 impl PooledFrames {
-    /// Whether the first scores more than another frame by the same segments. What was found by steps rarely outscores a frame that is right.
+    /// Whether the first scores more than another frame by the same segments. What was found by steps rarely outscores
+    /// a frame that is right.
     pub(crate) fn outscores(&self, other: &Matrix3<f64>, vote: &LineVote) -> bool {
         let tolerance = TOLERANCE_DEG.to_radians().sin();
         let score = |(normal, weight): &(Vector3<f64>, f64)| weight * fit(other.tr_mul(normal).abs().min(), tolerance);
         self.best > vote.longest(MAX_SEGMENTS).iter().map(score).sum()
     }
 
-    /// The frame that fits best of those that all segments refine, those of all three directions alike: what made a frame stand out is what
-    /// it is known by. `None` without any.
+    /// The frame that fits best of those that all segments refine, those of all three directions alike: what made a
+    /// frame stand out is what it is known by. `None` without any.
     pub(crate) fn refined(&self, vote: &LineVote) -> Option<Matrix3<f64>> {
         let refine = |start: &Matrix3<f64>| {
             let frame = vote.refine_frame(start, AxisWeights::new(0, 1.0, 1.0));
@@ -116,7 +118,8 @@ fn turn_of(index: usize) -> f64 {
     (index as f64 + 0.5) * FRAC_PI_2 / TURNS as f64
 }
 
-/// Scores the frames of one vertical; `turns` are the sines and cosines of theirs. Each segment reaches only the few turns that it fits.
+/// Scores the frames of one vertical; `turns` are the sines and cosines of theirs. Each segment reaches only the few
+/// turns that it fits.
 fn ring(
     vertical: &Vector3<f64>,
     turns: &[(f64, f64); TURNS],
@@ -133,7 +136,8 @@ fn ring(
         let (along, across) = (normal.dot(&first), normal.dot(&second));
         let (turn, half) =
             (quarter_turn(along, across), reached(tolerance.powi(2) / (along * along + across * across)));
-        // Beyond a quarter turn the same ones come again: counted from a full one below, none is negative, and casts round downward.
+        // Beyond a quarter turn the same ones come again: counted from a full one below, none is negative, and casts
+        // round downward.
         let from = ((turn - half + FULL_TURN) * places + 0.5) as usize;
         let to = ((turn + half + FULL_TURN) * places + 0.5) as usize;
         let mut place = from % TURNS;
@@ -163,8 +167,9 @@ fn fit(sine: f64, tolerance: f64) -> f64 {
     (1.0 - (sine / tolerance).powi(2)).max(0.0)
 }
 
-/// The turn, but for quarters, of the horizontal directions that are orthogonal to a normal, or nearest to that, by its parts along the horizontal axes;
-/// to within [`TURN_ERROR`]: an arc tangent by Hastings, "Approximations for Digital Computers" (1955), sheet 11.
+/// The turn, but for quarters, of the horizontal directions that are orthogonal to a normal, or nearest to that, by its
+/// parts along the horizontal axes; to within [`TURN_ERROR`]: an arc tangent by Hastings, "Approximations for Digital
+/// Computers" (1955), sheet 11.
 fn quarter_turn(along: f64, across: f64) -> f64 {
     let tangent = if along.abs() > across.abs() { across / along } else { -along / across };
     // Of a normal along the vertical any.

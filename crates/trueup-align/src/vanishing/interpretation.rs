@@ -132,9 +132,10 @@ impl InterpretationPlanes {
         self.total_weight += weight;
     }
 
-    /// What `direction . moment` of a segment is to be divided by for the distance in pixels of the segment's ends from the
-    /// line that joins its midpoint to the direction's vanishing point: `2 |f v_xy - m v_z|` for a pinhole. Behind another
-    /// lens the pixels are those of a picture that looks along the segment's middle, where the two are the same.
+    /// What `direction . moment` of a segment is to be divided by for the distance in pixels of the segment's ends from
+    /// the line that joins its midpoint to the direction's vanishing point: `2 |f v_xy - m v_z|` for a pinhole. Behind
+    /// another lens the pixels are those of a picture that looks along the segment's middle, where the two are the
+    /// same.
     pub(crate) fn reach(&self, line: usize, direction: &Vector3<f64>) -> f64 {
         match &self.middle_rays {
             None => 2.0 * (direction.xy() * self.focal_px - self.midpoints[line] * direction.z).norm(),
@@ -150,7 +151,8 @@ impl InterpretationPlanes {
         }
     }
 
-    /// A segment's middle as a pinhole of the same focal length sees it, pixels from the principal point; not finite where none does.
+    /// A segment's middle as a pinhole of the same focal length sees it, pixels from the principal point; not finite
+    /// where none does.
     pub(crate) fn straight_middle(&self, line: usize) -> Vector2<f64> {
         match &self.middle_rays {
             None => self.midpoints[line],

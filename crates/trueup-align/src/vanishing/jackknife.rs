@@ -12,18 +12,21 @@ use crate::vanishing::joint::{LineVote, Refinement};
 const MAX_GROUPS: usize = 8;
 /// A deviation estimated from k groups is too small for Student's t by about this over k - 1 (one standard deviation).
 const FEW_GROUPS: f64 = 0.66;
-/// A covariance has the shape that so many more groups would give it that scatter alike all round. Reasoned: the two axes of a vertical, a group each.
+/// A covariance has the shape that so many more groups would give it that scatter alike all round. Reasoned: the two
+/// axes of a vertical, a group each.
 const SHAPELESS_GROUPS: f64 = 2.0;
 
-/// Standard deviation, about any level axis, of what all lines of a scene err by alike, degrees. Fitted on 276 photographs cut from panoramas: the smallest
-/// hundredth with which the 95 % interval holds the truth of 95 % of them. docs/quality.md has the coverage on others.
+/// Standard deviation, about any level axis, of what all lines of a scene err by alike, degrees. Fitted on 276
+/// photographs cut from panoramas: the smallest hundredth with which the 95 % interval holds the truth of 95 % of them.
+/// docs/quality.md has the coverage on others.
 pub(crate) const SCENE_DEVIATION_DEG: f64 = 0.04;
 /// Width of a sector of the scene, degrees of longitude: a facade, seen from where its lines can be told apart.
 const SECTOR_DEG: f64 = 20.0;
 /// Fewer sectors with lines tell nothing of how they scatter.
 pub(crate) const MIN_SECTORS: usize = 4;
 
-/// The sector of longitude about the vertical, column `vertical` of a frame, that a direction of the common frame lies in: a number from 0.
+/// The sector of longitude about the vertical, column `vertical` of a frame, that a direction of the common frame lies
+/// in: a number from 0.
 fn sector(frame: &Matrix3<f64>, vertical: usize, toward: &Vector3<f64>) -> usize {
     let (across, along) = (frame.column((vertical + 1) % 3), frame.column((vertical + 2) % 3));
     let longitude = toward.dot(&across).atan2(toward.dot(&along));
@@ -58,8 +61,8 @@ impl AxisScatter {
         self.groups - 1
     }
 
-    /// The covariance to weigh `axis` by: it grows as Student's t does, and the fewer groups tell it, the less it is believed that the axis is
-    /// surer one way than the other.
+    /// The covariance to weigh `axis` by: it grows as Student's t does, and the fewer groups tell it, the less it is
+    /// believed that the axis is surer one way than the other.
     pub(crate) fn widened(&self, axis: &Vector3<f64>) -> Matrix3<f64> {
         let free = self.degrees_of_freedom() as f64;
         let about = (Matrix3::identity() - axis * axis.transpose()) * (0.5 * self.covariance.trace());
@@ -72,9 +75,9 @@ pub(crate) fn deviation(covariance: &Matrix3<f64>) -> f64 {
     covariance.trace().sqrt()
 }
 
-/// Covariance of the vertical, column `vertical` of a frame that a refinement found, rad^2, by what is left without one sector of the
-/// scene each; `None` with fewer than [`MIN_SECTORS`]. One thing that several photographs show is in the lines of all of them: leaving out
-/// photographs does not show that all rests on it.
+/// Covariance of the vertical, column `vertical` of a frame that a refinement found, rad^2, by what is left without one
+/// sector of the scene each; `None` with fewer than [`MIN_SECTORS`]. One thing that several photographs show is in the
+/// lines of all of them: leaving out photographs does not show that all rests on it.
 pub(crate) fn covariance_by_sectors(
     vote: &LineVote,
     refinement: Refinement<'_>,
@@ -85,8 +88,9 @@ pub(crate) fn covariance_by_sectors(
     Some(scatter.widened(&refinement.start.column(vertical).into_owned()))
 }
 
-/// Covariance, rad^2, by a delete-a-group jackknife over the photographs, of an axis (a column) of a frame that a refinement found, from which it starts
-/// again: how much it depends on which photographs are asked. Infinite on the diagonal of a single photograph, of which nothing is known.
+/// Covariance, rad^2, by a delete-a-group jackknife over the photographs, of an axis (a column) of a frame that a
+/// refinement found, from which it starts again: how much it depends on which photographs are asked. Infinite on the
+/// diagonal of a single photograph, of which nothing is known.
 ///
 /// Photographs, not segments, are left out, because the segments of one photograph err together.
 pub(crate) fn covariance_by_photographs(vote: &LineVote, refinement: Refinement<'_>, axis: usize) -> Matrix3<f64> {
@@ -95,21 +99,22 @@ pub(crate) fn covariance_by_photographs(vote: &LineVote, refinement: Refinement<
     scatter.map_or_else(|| Matrix3::from_diagonal_element(f64::INFINITY), widened)
 }
 
-/// The frames that come out of a refined one when the segments of one group of photographs at a time are not asked: at most [`MAX_GROUPS`]
-/// groups, of equal numbers of photographs as far as these can be divided.
+/// The frames that come out of a refined one when the segments of one group of photographs at a time are not asked: at
+/// most [`MAX_GROUPS`] groups, of equal numbers of photographs as far as these can be divided.
 pub(crate) fn without_some_photographs(vote: &LineVote, refinement: Refinement<'_>) -> Vec<Matrix3<f64>> {
     let groups = vote.photographs().min(MAX_GROUPS);
     let without = |group: usize| vote.refine_again(refinement, |one| one.photograph % groups != group);
     (0..groups).into_par_iter().map(without).collect()
 }
 
-/// The sector of longitude about the vertical, column `vertical` of `frame`, that the midpoint of every segment lies in, a number from 0; by photograph.
+/// The sector of longitude about the vertical, column `vertical` of `frame`, that the midpoint of every segment lies
+/// in, a number from 0; by photograph.
 pub(crate) fn sectors(vote: &LineVote, frame: &Matrix3<f64>, vertical: usize) -> Vec<Vec<usize>> {
     vote.by_midpoint(|toward| sector(frame, vertical, &toward))
 }
 
-/// Standard deviation of a number that was found without one group each, two or more; it grows as Student's t does of few. What [`AxisScatter`]
-/// is of an axis.
+/// Standard deviation of a number that was found without one group each, two or more; it grows as Student's t does of
+/// few. What [`AxisScatter`] is of an axis.
 pub(crate) fn deviation_of(without_each: &[f64]) -> f64 {
     let groups = without_each.len() as f64;
     let mean = without_each.iter().sum::<f64>() / groups;
@@ -122,8 +127,9 @@ fn few(degrees_of_freedom: f64) -> f64 {
     1.0 + FEW_GROUPS / degrees_of_freedom
 }
 
-/// The frames that come out of a refined one, whose column `vertical` is the vertical, when the segments of one sector of the scene at a time are not
-/// asked, whatever photographs show them. Only sectors with segments that support an axis that is used count.
+/// The frames that come out of a refined one, whose column `vertical` is the vertical, when the segments of one sector
+/// of the scene at a time are not asked, whatever photographs show them. Only sectors with segments that support an
+/// axis that is used count.
 ///
 /// The pieces of a line, its views in several photographs, and the window frames of a facade lie in one sector. What
 /// they err by alike, leaving out photographs would not show: another photograph still has it.
@@ -144,8 +150,8 @@ mod tests {
 
     use super::*;
 
-    /// The first axis 0.01 aside to four sides, four groups: the squares sum up to 4e-4, of which 3/4 count, times 1 + 0.66 / 3 for their fewness.
-    /// The third axis moves with the turns about y alone: squares of 2e-4.
+    /// The first axis 0.01 aside to four sides, four groups: the squares sum up to 4e-4, of which 3/4 count, times 1 +
+    /// 0.66 / 3 for their fewness. The third axis moves with the turns about y alone: squares of 2e-4.
     #[test]
     fn the_jackknife_of_known_frames() {
         let frames = [rotation_about_y(0.01), rotation_about_y(-0.01), rotation_about_z(0.01), rotation_about_z(-0.01)];
@@ -164,8 +170,8 @@ mod tests {
         assert_eq!(deviation_of(&[5.0; 4]), 0.0);
     }
 
-    /// By hand: of variances 8 and 0 about x and z, mean 4, three groups have two degrees of freedom: (2 x 8 + 2 x 4) / 4 = 6 and (2 x 0 + 2 x 4) / 4 = 2,
-    /// times (1 + 0.66 / 2)^2 = 1.7689; of a thousand groups nearly 8 and 0.
+    /// By hand: of variances 8 and 0 about x and z, mean 4, three groups have two degrees of freedom: (2 x 8 + 2 x 4) /
+    /// 4 = 6 and (2 x 0 + 2 x 4) / 4 = 2, times (1 + 0.66 / 2)^2 = 1.7689; of a thousand groups nearly 8 and 0.
     #[test]
     fn few_groups_tell_little_of_a_scatters_shape() {
         let covariance = Matrix3::from_diagonal(&Vector3::new(8e-4, 0.0, 0.0));

@@ -5,8 +5,8 @@
 //!
 //! The residual is measured where the segment was: the distance in pixels of its ends from the line that joins its
 //! midpoint to the vanishing point. With moment c = P x Q (ends P, Q), midpoint m and direction v in the camera frame,
-//! it is v . c / (2 |f v_xy - m v_z|), exactly; behind a lens that bends, what [`InterpretationPlanes::reach`] has in place
-//! of the divisor.
+//! it is v . c / (2 |f v_xy - m v_z|), exactly; behind a lens that bends, what [`InterpretationPlanes::reach`] has in
+//! place of the divisor.
 
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::geometry::{exp_rotation, nearest_rotation, orthonormal_complement};
@@ -58,10 +58,11 @@ impl AxisWeights {
         if axis == self.vertical { self.upright } else { self.level }
     }
 
-    /// What the segments along an axis tell of the frame's turns, from the normal matrix in rad^-2 and the gradient in rad^-1 that they have.
+    /// What the segments along an axis tell of the frame's turns, from the normal matrix in rad^-2 and the gradient in
+    /// rad^-1 that they have.
     ///
-    /// Level lines of a facade or a street are parallel to each other, and all of them may be out of level or of the right angle to others; what they
-    /// err by together, no number of them tells.
+    /// Level lines of a facade or a street are parallel to each other, and all of them may be out of level or of the
+    /// right angle to others; what they err by together, no number of them tells.
     fn told(&self, axis: usize, matrix: &Matrix3<f64>, gradient: &Vector3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
         let together = if axis == self.vertical { 0.0 } else { BUILT_DEVIATION_DEG.to_radians().powi(2) };
         // (matrix^-1 + together)^-1, also of a matrix that tells nothing of a turn about the axis.
@@ -181,8 +182,8 @@ impl LineVote {
         self.refine(Refinement { start, axes_used: 3, axis_weights }, scales(), |_| true)
     }
 
-    /// How well segments fit a frame: the sum of their weights, each times 1 / (1 + (r / s)^2) of its residual r, with s the last scale of the loss, whose
-    /// complement that is; nothing of those that support no axis.
+    /// How well segments fit a frame: the sum of their weights, each times 1 / (1 + (r / s)^2) of its residual r, with
+    /// s the last scale of the loss, whose complement that is; nothing of those that support no axis.
     pub(crate) fn fit(&self, frame: &Matrix3<f64>) -> f64 {
         self.photographs.iter().flat_map(|photograph| photograph.fits(frame)).sum()
     }
@@ -318,7 +319,8 @@ impl LineVote {
         self.refine_first_axis(&Matrix3::from_columns(&[*start, first, second])).column(0).into_owned()
     }
 
-    /// Every segment `asked` that supports one of the first `axes_used` axes of `frame`, weighed as the thing that it is a piece of.
+    /// Every segment `asked` that supports one of the first `axes_used` axes of `frame`, weighed as the thing that it
+    /// is a piece of.
     fn weighed_supporters(
         &self,
         frame: &Matrix3<f64>,
@@ -375,7 +377,8 @@ impl PhotographLines {
         })
     }
 
-    /// Calls `visit` for every segment `asked` that supports one of the first `axes_used` axes of `frame`, for a camera of this rotation.
+    /// Calls `visit` for every segment `asked` that supports one of the first `axes_used` axes of `frame`, for a camera
+    /// of this rotation.
     fn for_each_supporter(
         &self,
         rotation: &Matrix3<f64>,

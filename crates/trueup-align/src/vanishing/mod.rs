@@ -5,9 +5,9 @@
 //! orthogonal to: n . v = 0. No vanishing point in pixels is ever formed, so that one at infinity is no special case.
 //!
 //! # Departures
-//! The paper detects vanishing points without intrinsics ([`Intrinsics::Unknown`]); by default the focal length of the bundle
-//! adjustment is used, which makes the three directions orthogonal by construction. A focal length wrong by 10 % moves the
-//! roll by about 0.1 degree.
+//! The paper detects vanishing points without intrinsics ([`Intrinsics::Unknown`]); by default the focal length of the
+//! bundle adjustment is used, which makes the three directions orthogonal by construction. A focal length wrong by 10 %
+//! moves the roll by about 0.1 degree.
 
 pub(crate) mod frame_search;
 mod interpretation;

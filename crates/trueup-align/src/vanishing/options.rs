@@ -24,8 +24,8 @@ trueup_core::options! {
         /// Lower quality (fraction of the segments' weight that supports the triad) yields no triad. Raise it where
         /// organic scenes yield directions that are none; lower it where architecture is seen between much clutter.
         min_quality: f64 = 0.25, between(0.0, 1.0), "";
-        /// What the search knows of the camera. `unknown` to compare with the published method, or where the cameras are far
-        /// from what the photographs show.
+        /// What the search knows of the camera. `unknown` to compare with the published method, or where the cameras
+        /// are far from what the photographs show.
         intrinsics: Intrinsics = Intrinsics::Adjusted, Allowed::Any, "";
     }
 }

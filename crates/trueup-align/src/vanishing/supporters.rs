@@ -1,29 +1,34 @@
 //! Segments that support an axis of a frame, weighed as the things that they are pieces of.
 //!
-//! The planes of all segments along an axis meet in it. Segments whose planes lie close together about it are pieces of one thing, in however many
-//! photographs it is seen: the edges of a door frame, a row of windows, a trunk. They err together, by as much as the thing is out of plumb, so that a
-//! thing of fifty pieces tells hardly more than one of ten; and how far they scatter tells what the thing is. Those of a pillar point the same way to the
-//! noise of pixels, those of a tree's branches do not, and many of the latter are not to outvote few of the former.
+//! The planes of all segments along an axis meet in it. Segments whose planes lie close together about it are pieces of
+//! one thing, in however many photographs it is seen: the edges of a door frame, a row of windows, a trunk. They err
+//! together, by as much as the thing is out of plumb, so that a thing of fifty pieces tells hardly more than one of
+//! ten; and how far they scatter tells what the thing is. Those of a pillar point the same way to the noise of pixels,
+//! those of a tree's branches do not, and many of the latter are not to outvote few of the former.
 //!
 //! # Source
-//! Weighted least squares with one-way random effects (Searle, Casella and McCulloch, Variance Components, chapter 3): a piece i of the thing k errs by
-//! `m_k + e_i`. Variances of the e are estimated from each thing's own pieces, that of the m is given.
+//! Weighted least squares with one-way random effects (Searle, Casella and McCulloch, Variance Components, chapter 3):
+//! a piece i of the thing k errs by `m_k + e_i`. Variances of the e are estimated from each thing's own pieces, that of
+//! the m is given.
 
 use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Planes through an axis are of one thing where they lie within this of each other, degrees. From 1.25 to 5 the mean error is the same within 4 %.
+/// Planes through an axis are of one thing where they lie within this of each other, degrees. From 1.25 to 5 the mean
+/// error is the same within 4 %.
 const THING_DEG: f64 = 2.5;
-/// Standard deviation of a thing's pieces from its direction that is expected, pixels at their ends: where a line is found.
+/// Standard deviation of a thing's pieces from its direction that is expected, pixels at their ends: where a line is
+/// found.
 pub(super) const EXPECTED_SCATTER_PX: f64 = 0.5;
 /// How many pieces that expectation counts for. From 1 to 10 the mean error is the same within 2 %.
 const EXPECTED_COUNT: f64 = 3.0;
-/// Standard deviation of a built thing from its axis, and of level axes as wholes, about either axis across, degrees. Reasoned: what is built is plumb and level
-/// to a few millimeters in a meter. From 0.1 to 0.3 the mean error is the same within 5 %.
+/// Standard deviation of a built thing from its axis, and of level axes as wholes, about either axis across, degrees.
+/// Reasoned: what is built is plumb and level to a few millimeters in a meter. From 0.1 to 0.3 the mean error is the
+/// same within 5 %.
 pub(crate) const BUILT_DEVIATION_DEG: f64 = 0.2;
-/// A thing that leans by so many of its deviations counts for a quarter (Geman-McClure): it was not built along the axis. With 3 the mean error is up to
-/// 3.5 % larger, with 5 up to 1 % smaller.
+/// A thing that leans by so many of its deviations counts for a quarter (Geman-McClure): it was not built along the
+/// axis. With 3 the mean error is up to 3.5 % larger, with 5 up to 1 % smaller.
 const LEANING_DEVIATIONS: f64 = 4.0;
 
 /// A segment that supports an axis of a frame.
@@ -63,7 +68,8 @@ impl Thing {
         self.drift += sign * one.residual_px * one.half_length;
     }
 
-    /// Factor on the weights of its pieces where the axis may be `coarse` times as far off as things are; 0 without any, as of most classes of a pencil.
+    /// Factor on the weights of its pieces where the axis may be `coarse` times as far off as things are; 0 without
+    /// any, as of most classes of a pencil.
     fn factor(&self, coarse: f64) -> f64 {
         if self.count == 0.0 {
             return 0.0;
@@ -80,7 +86,8 @@ impl Thing {
     }
 }
 
-/// The things along each axis: classes of pencil angles, and the same half a class farther, so that no thing lies on a border of both.
+/// The things along each axis: classes of pencil angles, and the same half a class farther, so that no thing lies on a
+/// border of both.
 #[derive(Debug)]
 struct Things {
     classes: [Vec<Thing>; 2],
@@ -93,8 +100,8 @@ impl Things {
         Self { classes: std::array::from_fn(|_| vec![Thing::default(); 3 * of_each_axis]), of_each_axis }
     }
 
-    /// Where a segment belongs in either set of classes, and the sign of its residual there: planes half a turn about the axis from each other are the same, with
-    /// opposite normals.
+    /// Where a segment belongs in either set of classes, and the sign of its residual there: planes half a turn about
+    /// the axis from each other are the same, with opposite normals.
     fn places(&self, one: &Supporter, frame: &Matrix3<f64>) -> [(usize, f64); 2] {
         let across = one.moment.dot(&frame.column((one.axis + 1) % 3));
         let along = one.moment.dot(&frame.column((one.axis + 2) % 3));
@@ -111,8 +118,9 @@ impl Things {
     }
 }
 
-/// Multiplies the weights of all supporters of a frame by what the things are worth that they are pieces of. `coarse`, 1 at the end of a refinement, is how many
-/// times as far off the frame may be as things are: as long as it is, what leans is not known.
+/// Multiplies the weights of all supporters of a frame by what the things are worth that they are pieces of. `coarse`,
+/// 1 at the end of a refinement, is how many times as far off the frame may be as things are: as long as it is, what
+/// leans is not known.
 pub(super) fn weigh_as_things(supporters: &mut [Supporter], frame: &Matrix3<f64>, coarse: f64) {
     let mut things = Things::new();
     let places: Vec<_> = supporters.iter().map(|one| things.places(one, frame)).collect();
@@ -132,7 +140,8 @@ pub(super) fn weigh_as_things(supporters: &mut [Supporter], frame: &Matrix3<f64>
 mod tests {
     use super::*;
 
-    /// A piece of a line at `angle_deg` of the pencil about the first axis of the identity, 100 px long, whose ends the axis misses by `residual_px`.
+    /// A piece of a line at `angle_deg` of the pencil about the first axis of the identity, 100 px long, whose ends the
+    /// axis misses by `residual_px`.
     fn piece(angle_deg: f64, residual_px: f64) -> Supporter {
         let (across, along) = angle_deg.to_radians().sin_cos();
         let moment = Vector3::new(0.0, across, along);
@@ -145,8 +154,9 @@ mod tests {
         weighed.iter().map(|one| one.weight).collect()
     }
 
-    /// By hand: n pieces that all fit have a variance of 0.75 / (3 + n) px^2 and tell 2500 n (3 + n) / 0.75 rad^-2 of their direction; with 0.2 degrees, 1.2185e-5
-    /// rad^2, all of them together 82070 / (1 + 1 / x), x = 0.040616 n (3 + n): 45 % of that for five, 96 % for 22.
+    /// By hand: n pieces that all fit have a variance of 0.75 / (3 + n) px^2 and tell 2500 n (3 + n) / 0.75 rad^-2 of
+    /// their direction; with 0.2 degrees, 1.2185e-5 rad^2, all of them together 82070 / (1 + 1 / x), x = 0.040616 n
+    /// (3 + n): 45 % of that for five, 96 % for 22.
     #[test]
     fn a_thing_of_many_pieces_tells_no_more_than_how_plumb_it_is() {
         let told = |count: usize| {
@@ -159,10 +169,11 @@ mod tests {
         }
     }
 
-    /// Pieces that scatter tell less than as many that point the same way, and a thing that leans as a whole less again, unless the axis may be as far off. By hand: of ten
-    /// that fit, the variance is 0.75 / 13 = 0.0577 px^2, and 0.25 / 0.0577 / (1 + 5.28) = 0.690; of ten that are 2 px off, 40.75 / 13 = 3.135 px^2, and 0.25 / 3.135 / (1 +
-    /// 0.0972) = 0.0727. A lean of 0.04 is 0.0016 / 16 / (1 / 7975 + 1.2185e-5) = 0.727 squared scales, and leaves 1 / 1.727^2 = 0.335; 0.811 where the axis may be eight
-    /// times as far off.
+    /// Pieces that scatter tell less than as many that point the same way, and a thing that leans as a whole less
+    /// again, unless the axis may be as far off. By hand: of ten that fit, the variance is 0.75 / 13 = 0.0577 px^2, and
+    /// 0.25 / 0.0577 / (1 + 5.28) = 0.690; of ten that are 2 px off, 40.75 / 13 = 3.135 px^2, and 0.25 / 3.135 / (1 +
+    /// 0.0972) = 0.0727. A lean of 0.04 is 0.0016 / 16 / (1 / 7975 + 1.2185e-5) = 0.727 squared scales, and leaves 1 /
+    /// 1.727^2 = 0.335; 0.811 where the axis may be eight times as far off.
     #[test]
     fn what_scatters_or_leans_counts_less() {
         let alternating = |one: usize| if one.is_multiple_of(2) { 2.0 } else { -2.0 };
@@ -174,7 +185,8 @@ mod tests {
         assert!(near(of(&leans, 1.0), 0.0727 * 0.335) && near(of(&leans, 8.0), 0.0727 * 0.811));
     }
 
-    /// A thing at the place where the pencil begins again is one thing: planes at 0.1 and 179.9 degrees have opposite normals, and a lean of one sign in both is none of the thing.
+    /// A thing at the place where the pencil begins again is one thing: planes at 0.1 and 179.9 degrees have opposite
+    /// normals, and a lean of one sign in both is none of the thing.
     #[test]
     fn the_pencil_has_no_seam() {
         let around = |middle: f64, signs: [f64; 2]| {

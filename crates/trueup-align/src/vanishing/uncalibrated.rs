@@ -1,5 +1,5 @@
-//! Vanishing points of one photograph without its focal length: found one after the other in the photograph, and joined by
-//! the focal length at which two of them are orthogonal.
+//! Vanishing points of one photograph without its focal length: found one after the other in the photograph, and joined
+//! by the focal length at which two of them are orthogonal.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use rand::Rng;
@@ -20,7 +20,8 @@ const BELIEVABLE_FOCAL: std::ops::RangeInclusive<f64> = 0.3..=5.0;
 const ORDINARY_FOCAL: f64 = 1.0;
 /// Farthest that directions may be from orthogonal at a focal length that they do not tell: cosine of 80 degrees.
 const MAX_COSINE: f64 = 0.173_648_177_666_930_33;
-/// Farther from the center than this many larger sides, a vanishing point tells no focal length: its distance is too uncertain.
+/// Farther from the center than this many larger sides, a vanishing point tells no focal length: its distance is too
+/// uncertain.
 const FAR: f64 = 10.0;
 
 /// Three orthogonal directions and the focal length they were joined by.
@@ -44,15 +45,15 @@ struct Segment {
 
 /// The triad of most support, where one is found; the focal length that `planes` were made with does not matter.
 ///
-/// Vanishing points are homogeneous, so that one at infinity is no special case. A segment supports a point by the angle
-/// between it and the way from its middle to the point, w max(0, 1 - (sine / sin tolerance)^2), which asks no focal length.
-/// Points are found one after the other: hypotheses are where two drawn segments meet, the best is moved by least squares,
-/// and its segments leave. Two points p, q with centers of coordinates in the photograph's are orthogonal at the focal
-/// length f^2 = -p.q; each pair that can be makes a triad, and the segments choose.
+/// Vanishing points are homogeneous, so that one at infinity is no special case. A segment supports a point by the
+/// angle between it and the way from its middle to the point, w max(0, 1 - (sine / sin tolerance)^2), which asks no
+/// focal length. Points are found one after the other: hypotheses are where two drawn segments meet, the best is moved
+/// by least squares, and its segments leave. Two points p, q with centers of coordinates in the photograph's are
+/// orthogonal at the focal length f^2 = -p.q; each pair that can be makes a triad, and the segments choose.
 ///
 /// # Source
-/// Loosely Lee, Hebert and Kanade, Geometric Reasoning for Single Image Structure Recovery (CVPR 2009), as the paper follows
-/// it; the focal length of two orthogonal vanishing points is Caprile and Torre's (1990).
+/// Loosely Lee, Hebert and Kanade, Geometric Reasoning for Single Image Structure Recovery (CVPR 2009), as the paper
+/// follows it; the focal length of two orthogonal vanishing points is Caprile and Torre's (1990).
 ///
 /// # Departures
 /// Their search over all triples is one over pairs, since the third point follows from two.
@@ -181,8 +182,8 @@ fn refined(start: &Vector3<f64>, segments: &[&Segment], tolerance: f64) -> Vecto
     point
 }
 
-/// The focal length, in larger sides, at which two vanishing points are orthogonal, and the directions then; `None` if they
-/// cannot be.
+/// The focal length, in larger sides, at which two vanishing points are orthogonal, and the directions then; `None` if
+/// they cannot be.
 fn joined(first: &Vector3<f64>, second: &Vector3<f64>) -> Option<(f64, Matrix3<f64>)> {
     let is_near = |point: &Vector3<f64>| point.xy().norm() < FAR * point.z.abs();
     let focal = match is_near(first) && is_near(second) {
@@ -228,7 +229,8 @@ mod tests {
         assert!(joined(&Vector3::new(1.0, 0.0, 0.0), &Vector3::new(0.5, 1.0, 0.0)).is_none());
     }
 
-    /// Lines towards (200, -100) px from the center: a segment on one of them is at angle zero, one turned by 2 degrees at 2.
+    /// Lines towards (200, -100) px from the center: a segment on one of them is at angle zero, one turned by 2 degrees
+    /// at 2.
     #[test]
     fn a_segment_is_judged_by_the_angle_at_its_middle() {
         let point = Vector3::new(0.2, -0.1, 1.0);
@@ -244,8 +246,8 @@ mod tests {
         }
     }
 
-    /// Photographs that see two or three finite vanishing points, and one that looks straight at a wall: the roll comes out
-    /// whatever the focal length of the camera was thought to be.
+    /// Photographs that see two or three finite vanishing points, and one that looks straight at a wall: the roll comes
+    /// out whatever the focal length of the camera was thought to be.
     #[test]
     fn the_triad_is_found_whatever_the_focal_length_was_thought_to_be() {
         let options = VanishingOptions { intrinsics: Intrinsics::Unknown, ..VanishingOptions::default() };

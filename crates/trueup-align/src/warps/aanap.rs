@@ -313,8 +313,8 @@ mod tests {
         let fixed = example.place_with(WarpModel::Aanap, &options).expect("a pair");
         assert_eq!((fixed.folds, &fixed.meshes[0]), (0, &example.grids[0]));
         assert!(misalignment(&example, &fixed.meshes) < 1.0, "{}", misalignment(&example, &fixed.meshes));
-        // Panned by 28 degrees, the far border would be (cos 1.7 / cos 57.7)^2 = 3.5 times as high; the similarity, which
-        // the overlap decides, is nearly as large as the photograph.
+        // Panned by 28 degrees, the far border would be (cos 1.7 / cos 57.7)^2 = 3.5 times as high; the similarity,
+        // which the overlap decides, is nearly as large as the photograph.
         let border = |y: f64| fixed.meshes[1].warp(Vector2::new(WIDTH, y));
         let height = (border(HEIGHT) - border(0.0)).norm() / HEIGHT;
         assert!(height < 1.5, "{height}");
@@ -345,7 +345,8 @@ mod tests {
         assert!(misalignment(&example, &placed.meshes) < 12.0, "{}", misalignment(&example, &placed.meshes));
     }
 
-    /// Where what is placed stays, each photograph is as large as the reference, give or take what its overlap stretches.
+    /// Where what is placed stays, each photograph is as large as the reference, give or take what its overlap
+    /// stretches.
     #[test]
     fn photographs_of_a_wide_row_meet_a_reference_that_stays() {
         let yaws: Vec<f64> = (-4..=4).map(|k| 26.0 * f64::from(k)).collect();

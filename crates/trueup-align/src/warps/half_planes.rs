@@ -95,8 +95,8 @@ impl HalfPlanes {
     }
 }
 
-/// Where a pinhole would show points of a photograph, `step_px` apart, and how these places move with the photograph's own: homographies are of
-/// what pinholes show. Without those that no pinhole sees.
+/// Where a pinhole would show points of a photograph, `step_px` apart, and how these places move with the photograph's
+/// own: homographies are of what pinholes show. Without those that no pinhole sees.
 fn straightened(input: &WarpInput<'_>, photograph: usize, step_px: f64) -> Vec<Sample> {
     let frame = &input.frames[photograph];
     let grid = GridMesh::regular(frame.width, frame.height, step_px);

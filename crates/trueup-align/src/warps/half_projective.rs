@@ -38,7 +38,8 @@ struct Raster {
 const COARSE: Raster = Raster { offset_step: 100.0, sample_step_px: 120.0 };
 /// The raster that finds the lines of a pair; the step of the authors' program.
 const FINE: Raster = Raster { offset_step: 10.0, sample_step_px: 40.0 };
-/// Pairs whose lines are searched on the fine raster: the best of the coarse one, and those that may be better after all.
+/// Pairs whose lines are searched on the fine raster: the best of the coarse one, and those that may be better after
+/// all.
 const FINE_PAIRS: usize = 3;
 
 /// Places all photographs by one half-projective warp.
@@ -234,8 +235,8 @@ mod tests {
         (planes, warp)
     }
 
-    /// Warps are judged by where pinholes would show the photographs, as they are placed: behind a lens they come out as those of pinholes, but for the
-    /// points that the photographs have.
+    /// Warps are judged by where pinholes would show the photographs, as they are placed: behind a lens they come out
+    /// as those of pinholes, but for the points that the photographs have.
     #[test]
     fn samples_of_a_photograph_behind_a_lens_lie_where_it_is_placed() {
         let terms = LensTerms { radial: [-0.1, 0.0, 0.0, 0.0], ..LensTerms::default() };
@@ -313,9 +314,9 @@ mod tests {
         areas.iter().copied().fold(0.0, f64::max) / areas.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Five photographs span 104 degrees between their outer axes: no plane through an end shows them all. On the plane of the middle
-    /// one a photograph at 52 degrees is uneven by (cos 22 / cos 82)^3 = 296 from side to side; beside a neighbor of
-    /// its own, at 26 degrees, by (cos 4 / cos 56)^3 = 6.
+    /// Five photographs span 104 degrees between their outer axes: no plane through an end shows them all. On the plane
+    /// of the middle one a photograph at 52 degrees is uneven by (cos 22 / cos 82)^3 = 296 from side to side; beside a
+    /// neighbor of its own, at 26 degrees, by (cos 4 / cos 56)^3 = 6.
     #[test]
     fn both_ends_of_a_wide_row_keep_their_shape() {
         let example = rolled(&[3.0, -4.0, 1.0, 2.0, -3.0]);

@@ -76,8 +76,8 @@ fn chained(input: &WarpInput<'_>, target: usize) -> Result<Vec<Homography>> {
         .collect()
 }
 
-/// The homography from photograph `from` to photograph `to` by their matches, its denominator the depth; of what pinholes would show, where a
-/// lens bends.
+/// The homography from photograph `from` to photograph `to` by their matches, its denominator the depth; of what
+/// pinholes would show, where a lens bends.
 fn of_pair(input: &WarpInput<'_>, from: usize, to: usize) -> Result<Homography> {
     let pair = input.pairs.iter().find(|pair| (pair.a, pair.b) == (from.min(to), from.max(to)));
     let are_pinholes = [from, to].iter().all(|&one| input.cameras[one].lens.is_pinhole());

@@ -46,8 +46,8 @@ pub struct WarpInput<'a> {
 }
 
 impl WarpInput<'_> {
-    /// Where a pinhole of the camera's focal length and principal point shows what its photograph shows at `pixel`: what homographies are of.
-    /// Not finite for what no pinhole sees.
+    /// Where a pinhole of the camera's focal length and principal point shows what its photograph shows at `pixel`:
+    /// what homographies are of. Not finite for what no pinhole sees.
     pub(super) fn straight(&self, photograph: usize, pixel: Vector2<f64>) -> Vector2<f64> {
         let camera = &self.cameras[photograph];
         if camera.lens.is_pinhole() {

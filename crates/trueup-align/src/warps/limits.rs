@@ -82,8 +82,8 @@ pub(super) fn least_depth(homography: &Homography, input: &WarpInput<'_>, photog
     depths.map(|depth| if depth.is_nan() { f64::NEG_INFINITY } else { depth }).fold(f64::INFINITY, f64::min)
 }
 
-/// The depth of a point relative to its distance along the viewing direction; `homography` as of [`with_depth`], the point as of
-/// [`WarpInput::straight`].
+/// The depth of a point relative to its distance along the viewing direction; `homography` as of [`with_depth`], the
+/// point as of [`WarpInput::straight`].
 pub(super) fn depth_at(homography: &Homography, camera: &Camera, point: Vector2<f64>) -> f64 {
     let aside = (point - Vector2::from(camera.principal_point)) / camera.focal_px;
     homography.denominator(point) / aside.push(1.0).norm()

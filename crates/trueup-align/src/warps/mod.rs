@@ -1,9 +1,9 @@
 //! Warp models: methods that place the photographs by closed formulas instead of the mesh energies.
 //!
-//! A model is a file, an alternative of [`WarpModel`] and its arm in `run_within`. All start from the same matches, cameras
-//! and grids and yield the same [`WarpedMesh`] as the mesh energies do, so that renderer and measures are shared. A set of
-//! photographs that a model cannot place is refused with [`trueup_core::Error::NotApplicable`]: what cannot lie on one plane
-//! is not torn or blown up instead.
+//! A model is a file, an alternative of [`WarpModel`] and its arm in `run_within`. All start from the same matches,
+//! cameras and grids and yield the same [`WarpedMesh`] as the mesh energies do, so that renderer and measures are
+//! shared. A set of photographs that a model cannot place is refused with [`trueup_core::Error::NotApplicable`]: what
+//! cannot lie on one plane is not torn or blown up instead.
 
 mod aanap;
 mod apap;
@@ -34,8 +34,9 @@ pub use options::{AutostitchSurface, HomographySource, WarpModel, WarpOptions};
 /// Places the photographs by a warp model.
 ///
 /// # Errors
-/// [`trueup_core::Error::Options`]; [`trueup_core::Error::Unsolvable`] for lists of different lengths; [`trueup_core::Error::NotApplicable`] if the model
-/// cannot place these photographs, with the angle they reach; [`trueup_core::Error::Cancelled`].
+/// [`trueup_core::Error::Options`]; [`trueup_core::Error::Unsolvable`] for lists of different lengths;
+/// [`trueup_core::Error::NotApplicable`] if the model cannot place these photographs, with the angle they reach;
+/// [`trueup_core::Error::Cancelled`].
 pub fn run(
     model: WarpModel,
     input: &WarpInput<'_>,

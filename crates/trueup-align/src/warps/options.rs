@@ -63,8 +63,8 @@ trueup_core::options! {
         /// still show double, raise it where they are bent.
         apap_decay_px: f64 = 72.25, between(1.0, 10000.0), "working px";
         /// Whether the method aanap moves the photographs that are placed already along with the one that joins them.
-        /// Turn it off to keep the reference as it was taken, and where photographs are refused for their size; what joins
-        /// is then less like a similarity.
+        /// Turn it off to keep the reference as it was taken, and where photographs are refused for their size; what
+        /// joins is then less like a similarity.
         adapt_reference: bool = true, Allowed::Any, "";
     }
 }

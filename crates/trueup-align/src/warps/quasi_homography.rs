@@ -126,7 +126,8 @@ pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &Stag
         .collect()
 }
 
-/// The vertices of a photograph that a homography carries into another, and its matches with that one, as of [`WarpInput::straight`].
+/// The vertices of a photograph that a homography carries into another, and its matches with that one, as of
+/// [`WarpInput::straight`].
 fn overlap(input: &WarpInput<'_>, photograph: usize, parent: usize, homography: &Homography) -> Vec<Vector2<f64>> {
     let (grid, frame) = (&input.grids[photograph], &input.frames[parent]);
     let inside = |point: &Vector2<f64>| {

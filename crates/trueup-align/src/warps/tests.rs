@@ -178,7 +178,8 @@ fn homographies_behind_a_lens_meet() {
     }
 }
 
-/// The derivative of the places where a pinhole would show the pixels of a photograph, against differences; a pinhole's own stay.
+/// The derivative of the places where a pinhole would show the pixels of a photograph, against differences; a pinhole's
+/// own stay.
 #[test]
 fn straightening_moves_as_its_derivative_says() {
     let terms = LensTerms { radial: [-0.1, 0.02, 0.0, 0.0], ..LensTerms::default() };

@@ -51,7 +51,8 @@ pub(crate) struct CommandLine {
 pub(crate) enum Task {
     /// Stitch photographs into a panorama
     ///
-    /// Finds out by itself which photographs overlap. Those that belong elsewhere are left out, and the summary says why.
+    /// Finds out by itself which photographs overlap. Those that belong elsewhere are left out, and the summary says
+    /// why.
     Stitch(Box<StitchArgs>),
     /// Compose a stitched panorama again from its project: at another size, in another format, of other photographs
     ///
@@ -59,28 +60,32 @@ pub(crate) enum Task {
     Compose(Box<ComposeArgs>),
     /// Compare methods side by side: every method's panorama of the same photographs, with its measures, in one folder
     ///
-    /// Photographs are measured and matched once. The folder holds a page to look at (index.html), a page on which people
-    /// rank unnamed panoramas (ranking.html), every figure as JSON, the panoramas and their project files.
+    /// Photographs are measured and matched once. The folder holds a page to look at (index.html), a page on which
+    /// people rank unnamed panoramas (ranking.html), every figure as JSON, the panoramas and their project files.
     Compare(Box<CompareArgs>),
     /// Stitch a tree of folders: every folder's panoramas, with a page of all of them
     ///
-    /// Goes on where it was stopped, and never stops at one bad set. A line of JSON says of every panorama how it came out.
+    /// Goes on where it was stopped, and never stops at one bad set. A line of JSON says of every panorama how it came
+    /// out.
     Batch(Box<BatchArgs>),
     /// Show a page to stitch in, for one person on this machine, until Ctrl-C
     ///
     /// Prints an address to open in a browser. Photographs stay on this machine, and nobody else is let in.
     Serve(ServeArgs),
-    /// Print what a project file says of its panorama: the summary that `stitch` printed, with each photograph's measures
+    /// Print what a project file says of its panorama: the summary that `stitch` printed, with each photograph's
+    /// measures
     Inspect(InspectArgs),
     /// Print every measure of a panorama: its own, against the truth, and of the pixels where photographs overlap
     Evaluate(EvaluateArgs),
-    /// Write a page that shows why a panorama looks as it does: outlines, seams, lines, alignment, light, and what to make of it
+    /// Write a page that shows why a panorama looks as it does: outlines, seams, lines, alignment, light, and what to
+    /// make of it
     ///
     /// One HTML file that loads nothing. The photographs are read again to draw them; nothing is measured again.
     Report(ReportArgs),
     /// List the options: default, range, unit, meaning
     ///
-    /// Those that people have a reason to change for a panorama of their own; with --expert, those of the methods as well.
+    /// Those that people have a reason to change for a panorama of their own; with --expert, those of the methods as
+    /// well.
     Options(OptionsArgs),
     /// Print what completes commands, flags and their values when Tab is pressed
     ///

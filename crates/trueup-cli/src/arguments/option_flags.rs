@@ -82,8 +82,8 @@ impl OptionFlag {
         Self { note, ..self }
     }
 
-    /// Whether it turns or bounds a view by `value` where `options` have none: a mesh is drawn as it lies. Zero turns and bounds
-    /// nothing.
+    /// Whether it turns or bounds a view by `value` where `options` have none: a mesh is drawn as it lies. Zero turns
+    /// and bounds nothing.
     pub fn lacks_a_view(&self, value: &str, options: &StitchOptions) -> bool {
         let on_the_mesh = || options.fixed_by_method().arrange.projection.kind == Projection::Mesh;
         self.of_a_view && value.trim().parse() != Ok(0.0) && on_the_mesh()

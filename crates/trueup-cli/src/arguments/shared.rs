@@ -86,8 +86,8 @@ pub(crate) struct GeometryArgs {
 /// Pictures that say what of a photograph is to be seen.
 #[derive(Debug, Args)]
 pub(crate) struct MaskArgs {
-    /// A picture of the photograph NAME's size: what is black or transparent in it is ignored, and not shown where another
-    /// photograph can be; may be repeated
+    /// A picture of the photograph NAME's size: what is black or transparent in it is ignored, and not shown where
+    /// another photograph can be; may be repeated
     #[arg(long, value_name = "NAME=FILE", help_heading = "Photographs")]
     pub mask: Vec<String>,
 
@@ -137,8 +137,8 @@ pub(crate) struct MessageArgs {
     #[arg(long, value_name = "warning", value_enum, help_heading = "Messages")]
     pub fail_on: Option<FailOn>,
 
-    /// End with status 3 if matched points land farther apart than this, 95 of 100, in the photographs' pixels; what was made
-    /// is written all the same
+    /// End with status 3 if matched points land farther apart than this, 95 of 100, in the photographs' pixels; what
+    /// was made is written all the same
     #[arg(long, value_name = "PX", allow_hyphen_values = true, value_parser = distance, help_heading = "Messages")]
     pub max_error: Option<f64>,
 }

@@ -18,12 +18,12 @@ pub(super) const PAGE: &str = Batch::PAGE;
 /// How often the files of all sets are written while sets are worked at: each time every record is read.
 const SUM_UP_EVERY: Duration = Duration::from_secs(60);
 
-/// Works at a batch as `trueup batch` does: `tell` hears of each set when it is done, and now and then and at the end, also of a batch
-/// that is stopped, the files of all sets are written into the folder `output` of the batch.
+/// Works at a batch as `trueup batch` does: `tell` hears of each set when it is done, and now and then and at the end,
+/// also of a batch that is stopped, the files of all sets are written into the folder `output` of the batch.
 ///
 /// # Errors
-/// Those of [`Batch::run`] and of writing these files; what `tell` returns; [`Error::Input`] where one of these files is there that no batch
-/// has written.
+/// Those of [`Batch::run`] and of writing these files; what `tell` returns; [`Error::Input`] where one of these files
+/// is there that no batch has written.
 pub fn run_batch<E: From<Error> + Send>(
     batch: &Batch,
     output: &Path,

@@ -1,4 +1,5 @@
-//! What became of sets of photographs, in lines: of JSON for programs, of words for people. docs/batch.md describes the former.
+//! What became of sets of photographs, in lines: of JSON for programs, of words for people. docs/batch.md describes the
+//! former.
 
 use std::path::Path;
 

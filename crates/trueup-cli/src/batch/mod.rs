@@ -16,8 +16,8 @@ use crate::words::{one_line, printable};
 
 pub use files::run_batch;
 
-/// The lines of JSON of what became of a set, as `trueup batch --json` prints them: one for every panorama, or one that says why there
-/// is none.
+/// The lines of JSON of what became of a set, as `trueup batch --json` prints them: one for every panorama, or one that
+/// says why there is none.
 pub fn batch_lines(record: &SetRecord) -> String {
     lines::json(record)
 }

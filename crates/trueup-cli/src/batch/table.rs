@@ -85,8 +85,8 @@ fn row(record: &SetRecord, panorama: &Value) -> [String; COLUMNS.len()] {
     ]
 }
 
-/// A field as it stands in the file. Spreadsheets would compute what begins like a formula, and folders may be called anything:
-/// such a text gets an apostrophe before it.
+/// A field as it stands in the file. Spreadsheets would compute what begins like a formula, and folders may be called
+/// anything: such a text gets an apostrophe before it.
 fn quoted(field: &str) -> String {
     let is_formula = field.starts_with(['=', '+', '-', '@', '\t', '\r']) && field.parse::<f64>().is_err();
     let before = if is_formula { "'" } else { "" };

@@ -25,8 +25,8 @@ pub(crate) fn side_by_side(comparison: &Comparison, drawings: &[Drawing]) -> Res
     Ok(page(INDEX, &[STYLE, INDEX_STYLE], &[SCRIPT, INDEX_SCRIPT], &data))
 }
 
-/// The page on which people rank panoramas without their names. The names are in it, so that results can be saved, but not
-/// in a form that is read at a glance.
+/// The page on which people rank panoramas without their names. The names are in it, so that results can be saved, but
+/// not in a form that is read at a glance.
 pub(crate) fn blind_ranking(comparison: &Comparison, ranking: &Ranking) -> Result<String, Error> {
     let panoramas: Vec<Value> = ranking
         .panoramas

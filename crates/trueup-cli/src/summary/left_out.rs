@@ -10,8 +10,8 @@ pub(super) struct LeftOut<'a> {
     pub(super) hint: &'a str,
 }
 
-/// Those of the photographs left out that are `told`, by their reasons, in the order of the first of each; `names` are what
-/// the project's photographs are called.
+/// Those of the photographs left out that are `told`, by their reasons, in the order of the first of each; `names` are
+/// what the project's photographs are called.
 pub(super) fn left_out<'a>(
     project: &'a Project,
     names: &'a [String],

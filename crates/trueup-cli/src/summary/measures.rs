@@ -64,8 +64,8 @@ fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
     }
 }
 
-/// Why it is not told how upright: "upright not measured: vertical lines tell it of 1 of 2 photographs (2 needed)". What guided the panorama need
-/// not be vertical.
+/// Why it is not told how upright: "upright not measured: vertical lines tell it of 1 of 2 photographs (2 needed)".
+/// What guided the panorama need not be vertical.
 fn not_measured(measures: &Measures) -> String {
     let told = measures.photographs.iter().filter(|photograph| photograph.certain).count();
     let all = photographs_in_words(measures.photographs.len());

@@ -50,8 +50,8 @@ pub(crate) enum Measured {
 /// Stages faster than this, in seconds, are not named in the short list.
 const WORTH_NAMING_SECONDS: f64 = 0.05;
 
-/// What was made of which photographs, and why. `verbose` adds every pair, photograph, note and stage. Without a panorama's
-/// file, the measures are given for each photograph.
+/// What was made of which photographs, and why. `verbose` adds every pair, photograph, note and stage. Without a
+/// panorama's file, the measures are given for each photograph.
 pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool) -> String {
     let mut lines = LabeledLines::default();
     panorama(&mut lines, project, file);
@@ -119,7 +119,8 @@ fn panorama(lines: &mut LabeledLines, project: &Project, file: Option<&PanoramaF
     }
 }
 
-/// How much of what the photographs show was cut off, and how much of the panorama they do not show; `None` if neither is.
+/// How much of what the photographs show was cut off, and how much of the panorama they do not show; `None` if neither
+/// is.
 fn cropped(project: &Project) -> Option<String> {
     let crop = project.crop.as_ref()?;
     let percent = |share: f64| match 100.0 * share {
@@ -243,10 +244,11 @@ fn upright(project: &Project) -> String {
     }
 }
 
-/// Warnings, and with `verbose` notes, that are not told elsewhere; always, that another thing was drawn than the method means, or of other files
-/// than were named, that a photograph may lie on its side, that what the camera is fixed to is not looked at, where all is wanted what the view cuts
-/// off, and that a panorama is left with its ragged borders.
-/// What was found of the figures of photographs that were `measured` before comes without advice, which is for who stitches them.
+/// Warnings, and with `verbose` notes, that are not told elsewhere; always, that another thing was drawn than the
+/// method means, or of other files than were named, that a photograph may lie on its side, that what the camera is
+/// fixed to is not looked at, where all is wanted what the view cuts off, and that a panorama is left with its ragged
+/// borders. What was found of the figures of photographs that were `measured` before comes without advice, which is for
+/// who stitches them.
 fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool, measured: Measured) {
     /// The codes of these notes.
     const ALWAYS: [&str; 7] = [

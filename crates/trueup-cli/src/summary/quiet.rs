@@ -9,8 +9,8 @@ use super::left_out::{left_out, tells_of_left_out};
 use super::names::{listed, names};
 use crate::words::one_line;
 
-/// Every warning in a line of its own, what was left out in one, without hints. What several panoramas tell alike is told
-/// once, and what is in another one of them is not left out.
+/// Every warning in a line of its own, what was left out in one, without hints. What several panoramas tell alike is
+/// told once, and what is in another one of them is not left out.
 pub(crate) fn warnings(written: &[Written]) -> String {
     let used: BTreeSet<&Path> =
         written.iter().flat_map(|one| one.project.used_images()).map(|image| Path::new(&image.path)).collect();

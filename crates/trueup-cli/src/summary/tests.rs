@@ -140,7 +140,8 @@ time ";
     assert!(long.contains("b.jpg: uncertain: leans to the right by"), "{long}");
 }
 
-/// Who composes a project reads what was measured of the photographs that were stitched as just that, without advice to stitch them otherwise.
+/// Who composes a project reads what was measured of the photographs that were stitched as just that, without advice to
+/// stitch them otherwise.
 #[test]
 fn figures_of_an_earlier_stitch_are_called_so() {
     let mut project = measured(serde_json::Value::Null, serde_json::json!([]), serde_json::Value::Null);

@@ -26,11 +26,11 @@ pub(super) struct CoarseBlend<'a> {
 impl CoarseBlend<'_> {
     /// The blended level `first_level` of a canvas, from the photographs' own, with the levels above it.
     ///
-    /// What is blended is how each photograph differs from the level cut along the seams, which is added back: with masks that
-    /// add up to 1 that is the same. But beside its border a photograph's coarser samples are means of one side only. Those of
-    /// the photograph itself say that a bright sky beyond the border is as dark as the building before it, and the sky becomes
-    /// gray; those of a difference say that it goes on as it is. What differs because one photograph shows a thing that another does not is no
-    /// light ([`take_out`]).
+    /// What is blended is how each photograph differs from the level cut along the seams, which is added back: with
+    /// masks that add up to 1 that is the same. But beside its border a photograph's coarser samples are means of one
+    /// side only. Those of the photograph itself say that a bright sky beyond the border is as dark as the building
+    /// before it, and the sky becomes gray; those of a difference say that it goes on as it is. What differs because
+    /// one photograph shows a thing that another does not is no light ([`take_out`]).
     pub(super) fn blend(&self) -> Result<PyramidPlane<[f32; 4]>> {
         let Cut { level: cut, masks, shown } = self.cut()?;
         let change = self.blended_differences(&cut, &masks, &shown)?;
@@ -171,8 +171,9 @@ fn in_order<T: Send>(count: usize, make: impl Fn(usize) -> Result<T> + Sync, mut
     Ok(())
 }
 
-/// Takes the blended level from a photograph's, wherever that covers anything. Beside its border the difference soon counts
-/// next to nothing, by the fourth power of the share: there the photograph's own samples are means of one side already.
+/// Takes the blended level from a photograph's, wherever that covers anything. Beside its border the difference soon
+/// counts next to nothing, by the fourth power of the share: there the photograph's own samples are means of one side
+/// already.
 fn subtract(plane: &mut PyramidPlane<[f32; 4]>, blended: &PyramidPlane<[f32; 4]>) {
     let columns = plane.columns.clone();
     for y in plane.rows.clone() {
@@ -189,7 +190,8 @@ fn subtract(plane: &mut PyramidPlane<[f32; 4]>, blended: &PyramidPlane<[f32; 4]>
 /// A photograph's samples and their weights, from fine to coarse.
 type WeightedLevels = Vec<(PyramidPlane<[f32; 4]>, PyramidPlane<f32>)>;
 
-/// Weights are the masks of the next coarser level, but for the widest band: how wide that changes is what was asked for.
+/// Weights are the masks of the next coarser level, but for the widest band: how wide that changes is what was asked
+/// for.
 fn pyramid(level: CoarseLevel, mask: PyramidPlane<f32>, levels: u32) -> WeightedLevels {
     let mut pyramid = Vec::new();
     let (mut plane, mut mask) = (level.plane, mask);

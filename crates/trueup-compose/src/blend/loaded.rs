@@ -29,8 +29,8 @@ pub(super) struct PhotographLoader<'a> {
     pub(super) context: &'a StageContext<'a>,
 }
 
-/// Photographs in memory, within a number of bytes. Since the order of the work is known, the one that is wanted last makes
-/// room for others (Belady, IBM Systems Journal 5(2), 1966): no other choice decodes fewer files.
+/// Photographs in memory, within a number of bytes. Since the order of the work is known, the one that is wanted last
+/// makes room for others (Belady, IBM Systems Journal 5(2), 1966): no other choice decodes fewer files.
 pub(super) struct LoadedPhotographs<'a> {
     loader: PhotographLoader<'a>,
     room: usize,
@@ -96,8 +96,8 @@ impl<'a> LoadedPhotographs<'a> {
         Ok(())
     }
 
-    /// Lets go of photographs that are not `wanted` in batch `index` until `coming` more bytes fit: at first those that are
-    /// never wanted again, then those that are wanted last.
+    /// Lets go of photographs that are not `wanted` in batch `index` until `coming` more bytes fit: at first those that
+    /// are never wanted again, then those that are wanted last.
     fn make_room(&mut self, index: usize, wanted: &[usize], coming: usize) {
         let next_use = |at: usize| {
             let uses = &self.uses[at];

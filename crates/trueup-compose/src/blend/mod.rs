@@ -1,12 +1,13 @@
 //! Blending along seams: from photographs to finished pixels, tile by tile.
 //!
-//! The photographs were read once before, for their small views: from these come the seams, and the coarse levels of the
-//! blend, which reach far and are blended as a whole. Here the canvas is finished in tiles, strip by strip; a photograph is in memory from the first strip of tiles that shows it to the last, or less, if there is
-//! little memory. Where a tile shows one photograph alone, only what the coarse levels changed is added to it.
+//! The photographs were read once before, for their small views: from these come the seams, and the coarse levels of
+//! the blend, which reach far and are blended as a whole. Here the canvas is finished in tiles, strip by strip; a
+//! photograph is in memory from the first strip of tiles that shows it to the last, or less, if there is little memory.
+//! Where a tile shows one photograph alone, only what the coarse levels changed is added to it.
 //!
-//! Values are square roots of linear light. Differences between photographs that corrections have left are proportional to
-//! the light; added to linear light, what is smoothed over the bright side of a contour would push the dark side below
-//! black and show as a halo, while the root, near to what the eye sees, keeps both sides' errors equally small.
+//! Values are square roots of linear light. Differences between photographs that corrections have left are proportional
+//! to the light; added to linear light, what is smoothed over the bright side of a contour would push the dark side
+//! below black and show as a halo, while the root, near to what the eye sees, keeps both sides' errors equally small.
 
 mod coarse;
 mod levels;
@@ -91,8 +92,8 @@ impl<'a> Blending<'a> {
         Ok(Self { input, work: BlendWork { resampling, shown, first_level, levels, ignored } })
     }
 
-    /// What the coarse levels change of photographs at places of the canvas, pixels from its corner: square roots of linear
-    /// light.
+    /// What the coarse levels change of photographs at places of the canvas, pixels from its corner: square roots of
+    /// linear light.
     ///
     /// # Errors
     /// Those of a scratch file.
@@ -117,8 +118,8 @@ impl<'a> Blending<'a> {
         Ok(changes)
     }
 
-    /// Finishes `parts` of the canvas, and maybe more; what is not finished is empty. Progress counts placements of photographs,
-    /// of a stage that the caller begins.
+    /// Finishes `parts` of the canvas, and maybe more; what is not finished is empty. Progress counts placements of
+    /// photographs, of a stage that the caller begins.
     ///
     /// # Errors
     /// [`trueup_core::Error::Limits`] if more photographs meet at one place than there is memory for;
@@ -129,7 +130,8 @@ impl<'a> Blending<'a> {
         Ok(pixels)
     }
 
-    /// The same, where others finish regions of the canvas: `finish` has as many of them finished as it is told, each by [`finish_region`].
+    /// The same, where others finish regions of the canvas: `finish` has as many of them finished as it is told, each
+    /// by [`finish_region`].
     ///
     /// # Errors
     /// Those of `finish`; [`trueup_core::Error::Input`] if what they give cannot be; those of a scratch file.
@@ -271,8 +273,8 @@ impl<'a> Blending<'a> {
 
 /// What takes finished tiles.
 trait TakesTiles: Send {
-    /// Where the tiles in these places are to be finished, row by row, empty so far; `None` if they are to be [put](Self::put), those that show
-    /// nothing as well.
+    /// Where the tiles in these places are to be finished, row by row, empty so far; `None` if they are to be
+    /// [put](Self::put), those that show nothing as well.
     fn places(&mut self, tiles: &[Rectangle]) -> Option<Vec<Vec<&mut [RootPixel]>>>;
 
     /// Takes finished tiles.

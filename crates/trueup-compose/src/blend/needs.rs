@@ -14,14 +14,14 @@ const SEARCH_VIEW: f64 = 4.0 * 4.0 / 3.0 + 4.0 + 1.0;
 const SEARCH_CANVAS: f64 = 16.0;
 /// The same per pixel of the largest small view: the flow network.
 const SEARCH_CUT: f64 = 36.0;
-/// A photograph's pyramid, its masks and interpolated levels, and its samples before they are reduced, in pictures of its
-/// finest level.
+/// A photograph's pyramid, its masks and interpolated levels, and its samples before they are reduced, in pictures of
+/// its finest level.
 const COARSE_COPIES: f64 = 8.0;
 /// A tile's photograph, sums, masks and interpolated levels, in pictures of the tile with its margin.
 const TILE_COPIES: f64 = 8.0;
 
-/// Bytes that the photographs of `unrolled` take to be made small, cut along seams and, if there are any coarse `levels`,
-/// blended.
+/// Bytes that the photographs of `unrolled` take to be made small, cut along seams and, if there are any coarse
+/// `levels`, blended.
 pub(crate) fn needed_bytes(unrolled: &Unrolled<'_>, levels: Option<WholeLevels>) -> WorkBytes {
     let layout = unrolled.original_layout();
     let several = layout.placed.len() > 1;
@@ -48,8 +48,8 @@ pub(crate) fn needed_bytes(unrolled: &Unrolled<'_>, levels: Option<WholeLevels>)
     // The grown box at the sampled level has two of its samples for each of the first.
     let own_levels: Vec<f64> = boxes(f64::from(1 << first_level).recip(), RIM as f64).collect();
     let whole: f64 = canvas.iter().map(|&length| length.div_ceil(1 << first_level) as f64).product();
-    // The level cut along the seams, sums at all levels and what one of them is interpolated to, beside some photographs'
-    // own levels, and a byte for each sample of all: how much of it is shown.
+    // The level cut along the seams, sums at all levels and what one of them is interpolated to, beside some
+    // photographs' own levels, and a byte for each sample of all: how much of it is shown.
     let masks: f64 = own_levels.iter().sum();
     let coarse = sample * (whole * (1.0 + 4.0 / 3.0 + 1.0) + threads * COARSE_COPIES * largest(&own_levels)) + masks;
     let side = (tile_side(first_level) + 2 * mask_margin(first_level)) as f64;

@@ -78,11 +78,12 @@ pub(super) fn batches(work: &BlendWork<'_>, parts: &[Rectangle], bytes: &[usize]
     Ok(batches)
 }
 
-/// Sides of a region, in photographs: of a larger one more is lost with a computer that fails, of a smaller one more photographs
-/// are read for two or more regions. One of 4 reads a photograph (1 + 1 / 4)^2 = 1.6 times.
+/// Sides of a region, in photographs: of a larger one more is lost with a computer that fails, of a smaller one more
+/// photographs are read for two or more regions. One of 4 reads a photograph (1 + 1 / 4)^2 = 1.6 times.
 const REGION_PHOTOGRAPHS: f64 = 4.0;
 
-/// The `parts` of a canvas in regions of whole tiles, which have no tile in common, each with what of the parts lies in it.
+/// The `parts` of a canvas in regions of whole tiles, which have no tile in common, each with what of the parts lies in
+/// it.
 pub(super) fn regions(unrolled: &Unrolled<'_>, first_level: u32, parts: &[Rectangle]) -> Vec<Vec<Rectangle>> {
     let [width, height] = unrolled.finished();
     let tile = tile_side(first_level);
@@ -117,7 +118,8 @@ fn strips(along: usize, across: usize, side: usize, index: impl Fn(usize, usize)
         .collect()
 }
 
-/// The most bytes of photographs that are in memory at once if each stays from the first strip that shows it to the last.
+/// The most bytes of photographs that are in memory at once if each stays from the first strip that shows it to the
+/// last.
 fn most_alive(strips: &[Vec<usize>], tiles: &[BlendTile], bytes: &[usize]) -> usize {
     let mut spans: Vec<Option<[usize; 2]>> = vec![None; bytes.len()];
     for (index, strip) in strips.iter().enumerate() {
@@ -175,7 +177,8 @@ fn too_many(count: usize, needed: usize, room: usize) -> Error {
 mod tests {
     use super::*;
 
-    /// Photographs of 10 bytes each. Of three tiles that show two, the first and the second have one in common; a fourth shows three.
+    /// Photographs of 10 bytes each. Of three tiles that show two, the first and the second have one in common; a
+    /// fourth shows three.
     #[test]
     fn a_tile_that_shows_more_than_usual_is_finished_by_itself() {
         let tile = |shown: &[Label]| BlendTile { columns: 0..1, rows: 0..1, shown: shown.to_vec() };

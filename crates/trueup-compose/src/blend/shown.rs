@@ -55,8 +55,8 @@ impl ShownWhere<'_> {
         if rows.start > 0 && rows.end < height {
             return shown;
         }
-        // Beside the pole of a sphere, one photograph lies on the canvas in sectors, and its cells are wide: of two sectors, one may
-        // cover what the small views, which see no row so near the pole, show of the other.
+        // Beside the pole of a sphere, one photograph lies on the canvas in sectors, and its cells are wide: of two
+        // sectors, one may cover what the small views, which see no row so near the pole, show of the other.
         let placed = unrolled.placed();
         let photographs: BTreeSet<usize> =
             shown.iter().map(|&placement| placed[usize::from(placement)].photograph).collect();

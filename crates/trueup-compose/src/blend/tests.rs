@@ -66,7 +66,8 @@ fn root_of(level: u8) -> u16 {
 fn blending_photographs_that_agree_changes_nothing() {
     let lefts = [0, 70, 130, 200];
     let layout = layout(&lefts);
-    // Photographs taken from different places agree but for what their own samples lost; the same one agrees with itself.
+    // Photographs taken from different places agree but for what their own samples lost; the same one agrees with
+    // itself.
     let half_a_level = 65535 / 255 / 2;
     for (blend, tolerance) in [(Blend::MultiBand, half_a_level), (Blend::None, 1)] {
         let options = RenderOptions { blend, ..RenderOptions::default() };
@@ -103,8 +104,8 @@ fn a_difference_in_brightness_fades_over_the_seam() {
     assert!((0..layout.width).all(|x| [low, high].contains(&cut[55 * layout.width + x][0])));
 }
 
-/// A photograph that ends at a contour knows of one side only. Where it agrees with another that knows both, the panorama is
-/// that other one, on both sides.
+/// A photograph that ends at a contour knows of one side only. Where it agrees with another that knows both, the
+/// panorama is that other one, on both sides.
 #[test]
 fn a_sky_beside_the_border_of_a_dark_photograph_stays_bright() {
     const ROOF: usize = 50;
@@ -152,7 +153,8 @@ fn a_thing_that_one_photograph_alone_shows_does_not_lie_over_the_seam() {
     let mut asked = 0;
     for (at, pixel) in pixels.iter().enumerate() {
         let (x, y) = (at % layout.width, at / layout.width);
-        // Within two samples of the first level that is blended as a whole, contours count; the second photograph begins at column 30.
+        // Within two samples of the first level that is blended as a whole, contours count; the second photograph
+        // begins at column 30.
         if is_near(&COAT[0], x) || is_near(&COAT[1], y) || x.abs_diff(30) <= 16 {
             continue;
         }
@@ -270,8 +272,8 @@ fn assert_that_tiles_give_the_whole(work: &BlendWork<'_>, photographs: &[Option<
     }
 }
 
-/// All of one photograph is ignored, and where the other is shown, that one ends three columns ahead of the canvas: the seams, found in small
-/// views, know no better. Who else is there is seen in these columns.
+/// All of one photograph is ignored, and where the other is shown, that one ends three columns ahead of the canvas: the
+/// seams, found in small views, know no better. Who else is there is seen in these columns.
 #[test]
 fn what_is_ignored_fills_what_nobody_else_covers() {
     with_work(&[0, 60], 3, |work, photographs| {
@@ -324,7 +326,8 @@ fn a_tile_of_one_photograph_is_what_blending_would_give() {
     });
 }
 
-/// Photographs around a cylinder of `AROUND` columns, the first at column `by`; the last lies across the ends for `by` = 0.
+/// Photographs around a cylinder of `AROUND` columns, the first at column `by`; the last lies across the ends for
+/// `by` = 0.
 fn ring(by: usize) -> CanvasLayout {
     let mut layout = layout(&RING.map(|left| left + by));
     // As layouts have it: the middle of each photograph within the canvas.
@@ -389,8 +392,8 @@ fn a_cylinder_may_be_cut_open_anywhere() {
     }
 }
 
-/// The ends of a turn are places like any other at all levels, up to samples of a third of the turn: moved by whole ones of
-/// them, the panorama is moved and nothing else.
+/// The ends of a turn are places like any other at all levels, up to samples of a third of the turn: moved by whole
+/// ones of them, the panorama is moved and nothing else.
 #[test]
 fn all_levels_of_a_turn_repeat() {
     let period = ring(0).period.expect("a turn");

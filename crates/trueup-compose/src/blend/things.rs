@@ -1,18 +1,19 @@
 //! What photographs show differently because something moved or stood nearer, not because of their light.
 //!
-//! A wide transition carries what differs between two photographs over the seam. Light has to go over so; a dark coat that one photograph alone
-//! shows would lie on what the other one shows there, as fog. Both are differences of some levels over some width, and what tells them apart
-//! is their outline: where light differs from one place to the next, both photographs show an edge there, or neither does; a thing has an outline that one
-//! of them alone shows.
+//! A wide transition carries what differs between two photographs over the seam. Light has to go over so; a dark coat
+//! that one photograph alone shows would lie on what the other one shows there, as fog. Both are differences of some
+//! levels over some width, and what tells them apart is their outline: where light differs from one place to the next,
+//! both photographs show an edge there, or neither does; a thing has an outline that one of them alone shows.
 
 use crate::label::{Label, NOBODY};
 use crate::pyramid::{PyramidPlane, color};
 
-/// Difference from what the photographs' light differs by around, up to which there is no thing, square root of linear light; some 15 of
-/// 255 gray levels. What is left of smaller ones when a transition spreads them is not seen.
+/// Difference from what the photographs' light differs by around, up to which there is no thing, square root of linear
+/// light; some 15 of 255 gray levels. What is left of smaller ones when a transition spreads them is not seen.
 const STANDS_OUT: f32 = 0.06;
 
-/// Change over three samples from which on it is an edge, square root of linear light: what stands out ends there, as things do.
+/// Change over three samples from which on it is an edge, square root of linear light: what stands out ends there, as
+/// things do.
 const EDGE: f32 = STANDS_OUT;
 
 /// An edge is one photograph's alone where the other shows less than two fifths of it.
@@ -24,13 +25,15 @@ const COVERED: f32 = 0.5;
 /// Places of an outline that are asked at least.
 const FEWEST_PLACES: usize = 4;
 
-/// Times that the light around is averaged, each without what stood out from the mean before. The first begins with the median of all.
+/// Times that the light around is averaged, each without what stood out from the mean before. The first begins with the
+/// median of all.
 const ROUNDS: usize = 3;
 
 /// Belief in what stands out from the median of all, where nothing around does not.
 const LEAST_BELIEF: f32 = 0.05;
 
-/// Samples beyond a thing that its edge may be spread over, where the seam runs along it: those of the pyramid's kernel.
+/// Samples beyond a thing that its edge may be spread over, where the seam runs along it: those of the pyramid's
+/// kernel.
 const SPREAD: usize = 2;
 
 /// Which placement of a photograph a level's samples show, if they show one alone.
@@ -67,8 +70,8 @@ pub(super) struct Beside<'a> {
     pub(super) levels: u32,
 }
 
-/// Takes things out of a photograph's `differences` from what is shown (times their shares, as samples are): in their place comes what the
-/// differences around them have in common.
+/// Takes things out of a photograph's `differences` from what is shown (times their shares, as samples are): in their
+/// place comes what the differences around them have in common.
 pub(super) fn take_out(differences: &mut PyramidPlane<[f32; 4]>, beside: &Beside<'_>) {
     let stands_out = |texel: &[f32; 4]| color(*texel).is_some_and(|difference| largest(difference) > STANDS_OUT);
     if !differences.texels.iter().any(stands_out) {
@@ -97,7 +100,8 @@ pub(super) fn take_out(differences: &mut PyramidPlane<[f32; 4]>, beside: &Beside
     }
 }
 
-/// How far a difference is believed to be one of the light around it: fully up to where a thing begins, not at all from twice as much on.
+/// How far a difference is believed to be one of the light around it: fully up to where a thing begins, not at all from
+/// twice as much on.
 fn belief(own: [f32; 3], light: [f32; 3]) -> f32 {
     (2.0 - largest(minus(own, light)) / STANDS_OUT).clamp(0.0, 1.0)
 }
@@ -161,7 +165,8 @@ impl<'a> Compared<'a> {
         })
     }
 
-    /// The mean of the differences around every sample, as wide as samples so many levels above; they are weighted by place and difference.
+    /// The mean of the differences around every sample, as wide as samples so many levels above; they are weighted by
+    /// place and difference.
     fn mean(&self, levels: u32, weight: impl Fn(usize, [f32; 3]) -> f32) -> PyramidPlane<[f32; 4]> {
         let mut plane = self.differences.clone();
         for (at, texel) in plane.texels.iter_mut().enumerate() {
@@ -222,7 +227,8 @@ impl<'a> Compared<'a> {
             .then_some(beside)
     }
 
-    /// What the photograph, and what is shown, change by over the outline between two samples, from one sample within to one outside.
+    /// What the photograph, and what is shown, change by over the outline between two samples, from one sample within
+    /// to one outside.
     fn edge(&self, within: usize, outside: usize, step: [isize; 2], stands_out: &[bool]) -> [[f32; 3]; 2] {
         let back = step.map(|length| -length);
         let inner = self.same_beside(within, back).filter(|&at| stands_out[at]).unwrap_or(within);
@@ -304,7 +310,8 @@ mod tests {
     /// The photograph itself is shown left of it.
     const SEAM: usize = 16;
 
-    /// Differences of a photograph of gray levels `own` from one of levels `other` that is shown right of the seam, with things taken out.
+    /// Differences of a photograph of gray levels `own` from one of levels `other` that is shown right of the seam,
+    /// with things taken out.
     fn taken_out(own: impl Fn(usize, usize) -> f32, other: impl Fn(usize, usize) -> f32) -> Vec<f32> {
         let plane = |level: &dyn Fn(usize, usize) -> f32| {
             let mut plane = PyramidPlane::<[f32; 4]>::new(0..WIDTH, 0..HEIGHT);

@@ -208,7 +208,8 @@ impl BlendTile {
         }
     }
 
-    /// [`Self::blended`] of photographs that are shown by `masks`; `None`, and nothing of `out` set, if the claim does not do.
+    /// [`Self::blended`] of photographs that are shown by `masks`; `None`, and nothing of `out` set, if the claim does
+    /// not do.
     fn blended_by(
         &self,
         claim: Claim,
@@ -289,8 +290,8 @@ impl BlendTile {
         Some(())
     }
 
-    /// Where in a window what is shown by `masks` covers anything; `None` if nobody asks because nothing is ignored. Labels may reach beyond
-    /// what a photograph covers: they were found in small views.
+    /// Where in a window what is shown by `masks` covers anything; `None` if nobody asks because nothing is ignored.
+    /// Labels may reach beyond what a photograph covers: they were found in small views.
     fn shown_instead(
         &self,
         [columns, rows]: [&Range<usize>; 2],
@@ -374,8 +375,8 @@ impl RowSink for FinishingRows<'_, '_> {
 /// Which photographs count at a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Claim {
-    /// The one that is shown there, and what blending brings over the seams from others. It does where all pixels are covered
-    /// wholly by the one they show: then the others are only read as far as they are felt.
+    /// The one that is shown there, and what blending brings over the seams from others. It does where all pixels are
+    /// covered wholly by the one they show: then the others are only read as far as they are felt.
     OwnersAlone,
     /// All that cover it, those that are not shown hardly: where the one that is shown ends, they show.
     Everyone,
@@ -391,8 +392,8 @@ impl Claim {
     }
 }
 
-/// The part of a window in which a photograph shown by `mask` is felt at the levels below the first, from and to samples that all
-/// of these have.
+/// The part of a window in which a photograph shown by `mask` is felt at the levels below the first, from and to
+/// samples that all of these have.
 fn felt(
     mask: &PyramidPlane<f32>,
     first_level: u32,
@@ -409,8 +410,8 @@ fn felt(
     let across = mask.rows.clone().filter_map(of_columns).reduce(joined).unwrap_or(0..0);
     let first = mask.rows.clone().find(|&y| is_shown(mask.row(y))).unwrap_or(0);
     let last = mask.rows.clone().rfind(|&y| is_shown(mask.row(y))).map_or(0, |last| last + 1);
-    // Weights reach 3 2^first_level - 2 pixels beyond what is shown ([`mask_margin`]); what they weigh is made of 2^first_level - 2
-    // pixels farther away.
+    // Weights reach 3 2^first_level - 2 pixels beyond what is shown ([`mask_margin`]); what they weigh is made of
+    // 2^first_level - 2 pixels farther away.
     let reach = 4 << first_level;
     let grown = |shown: Range<usize>, window: &Range<usize>| {
         if shown.is_empty() {
@@ -497,6 +498,7 @@ fn finished(pixel: [f32; 4]) -> RootPixel {
 #[allow(clippy::manual_clamp)]
 #[inline(always)]
 fn finished_sample(value: f32) -> u16 {
-    // `max` first: unlike `clamp`, it turns NaN into a number. By 32 bits, since vector instructions have no shorter conversion.
+    // `max` first: unlike `clamp`, it turns NaN into a number. By 32 bits, since vector instructions have no shorter
+    // conversion.
     (value * 65535.0 + 0.5).max(0.0).min(65535.0) as i32 as u16
 }

@@ -16,7 +16,8 @@ use crate::window::Window;
 /// Pixels of the small views along a cell's side, at least: fewer, and some cell has none.
 const LEAST_PIXELS: f64 = 2.0;
 
-/// Steps from an empty cell to the farthest whose deviation is asked for: to the one beside it, and from there once more.
+/// Steps from an empty cell to the farthest whose deviation is asked for: to the one beside it, and from there once
+/// more.
 const BORDER_STEPS: usize = 2;
 
 /// The cells of a canvas of which nothing is composed yet.

@@ -13,31 +13,34 @@ use crate::window;
 
 /// What a cell of a thing that stands out is worth beside a calm one, which is worth 1.
 const THING: f32 = 4.0;
-/// Cost of a cell that no photograph covers and that is filled: it is filled only where that saves more than as many calm
-/// cells.
+/// Cost of a cell that no photograph covers and that is filled: it is filled only where that saves more than as many
+/// calm cells.
 const FILLED: f32 = 1.0;
 /// Further cost of a filled cell if the border near it were not smooth at all; a share of it for a share.
 const FILLED_BESIDE_ROUGH: f32 = 10.0;
-/// Cost of a thing that ends in front of what is filled, as a wire or a lamp post that ran out of the photograph, for each filled cell at it: calm cells as
-/// a multiple of the panorama's longer side, so many rows of them. A line three cells wide costs a strip of about a twentieth of the longer
-/// side. Times the cube of the share of the border that is smooth there: alone in an even sky it is seen to end, among others it is not.
+/// Cost of a thing that ends in front of what is filled, as a wire or a lamp post that ran out of the photograph, for
+/// each filled cell at it: calm cells as a multiple of the panorama's longer side, so many rows of them. A line three
+/// cells wide costs a strip of about a twentieth of the longer side. Times the cube of the share of the border that is
+/// smooth there: alone in an even sky it is seen to end, among others it is not.
 const ENDED: f32 = 10.0;
 /// Strength of an edge up to which nothing is seen to end there: noise, and the soft edges of clouds.
 const CALM_EDGE: f32 = 0.2;
 /// Cost of cutting through a thing, for each cell of the cut: calm cells as a share of the panorama's longer side.
 const CUT: f32 = 0.1;
-/// Of that, what cutting it to the left or right costs: things that stand on the ground are expected to go on to the sides.
+/// Of that, what cutting it to the left or right costs: things that stand on the ground are expected to go on to the
+/// sides.
 const CUT_ASIDE: f32 = 0.5;
-/// Cost of cutting off the upper end of a thing that ends within the picture, for each column of cells: calm cells as a share
-/// of the panorama's longer side.
+/// Cost of cutting off the upper end of a thing that ends within the picture, for each column of cells: calm cells as a
+/// share of the panorama's longer side.
 const BEHEADED: f32 = 0.3;
-/// How much more it costs if the end rises above most of what is beside it, for each part of the panorama's longer side by
-/// which it does: a tower that rises by a tenth counts four times as much as a roof among roofs.
+/// How much more it costs if the end rises above most of what is beside it, for each part of the panorama's longer side
+/// by which it does: a tower that rises by a tenth counts four times as much as a roof among roofs.
 const PROMINENT: f32 = 30.0;
-/// Share of the panorama's longer side by which a thing rises above most of what is beside it that is not to be cut off: a tower.
+/// Share of the panorama's longer side by which a thing rises above most of what is beside it that is not to be cut
+/// off: a tower.
 const TOWERING: f32 = 0.04;
-/// Half the width of the thing that an upper end belongs to, as a share of the panorama's longer side: a spire counts as much
-/// as the tower that bears it.
+/// Half the width of the thing that an upper end belongs to, as a share of the panorama's longer side: a spire counts
+/// as much as the tower that bears it.
 const BEARER: f64 = 0.02;
 
 /// What may be filled of a rectangle.
@@ -81,8 +84,8 @@ impl<'a> Choice<'a> {
         Self { cells, layout, coverage, worth, reach, sky }
     }
 
-    /// The rectangle that loses least of what matters and has no holes but such as may be filled; of a full turn, of all its width.
-    /// `None` if there is none.
+    /// The rectangle that loses least of what matters and has no holes but such as may be filled; of a full turn, of
+    /// all its width. `None` if there is none.
     pub(super) fn rectangle(&self, filling: Filling) -> Option<Chosen> {
         let Self { cells, layout, worth, .. } = self;
         let (fillable, free_rows) = match filling {
@@ -112,7 +115,8 @@ fn longer_side(cells: &Cells) -> f32 {
     cells.columns.max(cells.rows) as f32
 }
 
-/// What every cell and every cut is worth. In the first `free_rows` it costs nothing if a thing ends in front of what is filled.
+/// What every cell and every cut is worth. In the first `free_rows` it costs nothing if a thing ends in front of what
+/// is filled.
 fn worths(cells: &Cells, worth: &Worth, fillable: &Fillable, free_rows: usize) -> Worths {
     let (columns, rows) = (cells.columns, cells.rows);
     let Worth { edges, salience, ends } = worth;

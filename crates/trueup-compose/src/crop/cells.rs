@@ -9,8 +9,8 @@ use trueup_core::raster::{LUMA, RowSource};
 
 use crate::coverage::Coverage;
 
-/// Cells at most: a thing of half a hundredth of the panorama's longer side is one or more of them, and the search among
-/// all rectangles takes a fraction of a second.
+/// Cells at most: a thing of half a hundredth of the panorama's longer side is one or more of them, and the search
+/// among all rectangles takes a fraction of a second.
 const MOST_CELLS: usize = 1 << 16;
 
 /// Rows of pixels that are read of a row of cells, at most: enough for means of one level in noise.
@@ -114,7 +114,8 @@ impl Cells {
         Ok(Self { side, columns, rows, covered, colors, deviations, around })
     }
 
-    /// The same, where covered cells of which nothing `is_seen` are as those beside them are in the mean, step by step from what is seen.
+    /// The same, where covered cells of which nothing `is_seen` are as those beside them are in the mean, step by step
+    /// from what is seen.
     pub(super) fn with_unseen(mut self, mut is_seen: Vec<bool>) -> Self {
         let mut unseen: Vec<usize> = (0..is_seen.len()).filter(|&at| self.covered[at] && !is_seen[at]).collect();
         while !unseen.is_empty() {

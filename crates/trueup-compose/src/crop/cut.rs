@@ -90,8 +90,9 @@ impl CutCells {
         self.parts.iter().map(place).collect()
     }
 
-    /// The cells as they will be when blending makes these `changes` of [`Self::places`]. Steps at seams, which blending takes
-    /// away, count as no deviation. Cells between the pixels of the small views, as narrow ones at the canvas's end may be, are like those beside them.
+    /// The cells as they will be when blending makes these `changes` of [`Self::places`]. Steps at seams, which
+    /// blending takes away, count as no deviation. Cells between the pixels of the small views, as narrow ones at the
+    /// canvas's end may be, are like those beside them.
     pub(crate) fn blended(self, changes: &[[f32; 3]], encoding: &Encoding) -> Cells {
         const WHITE: f32 = 255.0;
         let CellGrid { side, columns, rows, .. } = self.ahead.grid;

@@ -1,5 +1,5 @@
-//! Cropping: the part of the canvas that becomes the panorama. Chosen by what the panorama shows, or is going to show, so that neither
-//! seams nor light depend on it; what lies outside of it need not be composed then.
+//! Cropping: the part of the canvas that becomes the panorama. Chosen by what the panorama shows, or is going to show,
+//! so that neither seams nor light depend on it; what lies outside of it need not be composed then.
 
 mod ahead;
 mod auto;
@@ -65,10 +65,11 @@ impl Frame {
 }
 
 impl Framing<'_> {
-    /// The frame of a panorama, which is all that was composed on the canvas of `layout`. Of a full turn, rows alone are cut.
+    /// The frame of a panorama, which is all that was composed on the canvas of `layout`. Of a full turn, rows alone
+    /// are cut.
     ///
-    /// What [`Crop::Auto`] keeps may have holes that are to be filled ([`Self::gaps`]): where the picture beside them is
-    /// smooth.
+    /// What [`Crop::Auto`] keeps may have holes that are to be filled ([`Self::gaps`]): where the picture beside them
+    /// is smooth.
     ///
     /// # Errors
     /// Those of reading the panorama.

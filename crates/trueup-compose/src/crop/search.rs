@@ -28,11 +28,11 @@ pub(super) struct Best {
 }
 
 impl Worths {
-    /// The rectangle that is worth most, the topmost and leftmost of equal ones; of the whole width only if `whole_rows`.
-    /// `None` if none is worth anything.
+    /// The rectangle that is worth most, the topmost and leftmost of equal ones; of the whole width only if
+    /// `whole_rows`. `None` if none is worth anything.
     ///
-    /// All pairs of rows, and between them the best stretch of columns by one pass (Bentley, "Programming pearls: algorithm
-    /// design techniques", Communications of the ACM 27(9), 1984, in two dimensions).
+    /// All pairs of rows, and between them the best stretch of columns by one pass (Bentley, "Programming pearls:
+    /// algorithm design techniques", Communications of the ACM 27(9), 1984, in two dimensions).
     pub(super) fn best(&self, whole_rows: bool) -> Option<Best> {
         let of_top = |top: usize| self.best_from(top, whole_rows);
         let all: Vec<Option<Best>> = (0..self.rows).into_par_iter().map(of_top).collect();

@@ -1,4 +1,5 @@
-//! Which empty cells may be filled: those beside which the picture is so smooth that what is filled goes on as it would.
+//! Which empty cells may be filled: those beside which the picture is so smooth that what is filled goes on as it
+//! would.
 
 use super::cells::{Cells, near};
 use super::worth::box_means;
@@ -19,12 +20,13 @@ impl Smoothness {
     pub(super) const CLOUDS: Self = Self { deviation: 10.0, contrast: 20.0 };
 }
 
-/// Half the side of the square over which the border of what is covered is judged, as a share of the panorama's longer side: the
-/// colors of what is filled come from as far as it is deep, so that a twig, a wire or the edge of a cloud at one place of a sky's
-/// border alone says nothing of it.
+/// Half the side of the square over which the border of what is covered is judged, as a share of the panorama's longer
+/// side: the colors of what is filled come from as far as it is deep, so that a twig, a wire or the edge of a cloud at
+/// one place of a sky's border alone says nothing of it.
 const BORDER_STRETCH: f64 = 0.05;
-/// Least share of the border near an empty cell that is smooth: twigs that run into it may be beside it, a tree's crown may not.
-/// With a half, the foggy sky over the twigs of CAVE-columbus_circle is not filled, and the tower beside it not kept.
+/// Least share of the border near an empty cell that is smooth: twigs that run into it may be beside it, a tree's crown
+/// may not. With a half, the foggy sky over the twigs of CAVE-columbus_circle is not filled, and the tower beside it
+/// not kept.
 const LEAST_SMOOTH: f32 = 0.3;
 
 /// What may be filled.
@@ -35,9 +37,9 @@ pub(super) struct Fillable {
 }
 
 impl Fillable {
-    /// Empty cells beside a smooth border, no farther than `reach` cells from it: from the covered cells outwards, step by
-    /// step, each is as smooth as those beside it that were reached before are in the mean. Cells of the border are as smooth as
-    /// the share of it within [`BORDER_STRETCH`] is.
+    /// Empty cells beside a smooth border, no farther than `reach` cells from it: from the covered cells outwards, step
+    /// by step, each is as smooth as those beside it that were reached before are in the mean. Cells of the border are
+    /// as smooth as the share of it within [`BORDER_STRETCH`] is.
     pub(super) fn of(cells: &Cells, smooth: Smoothness, reach: usize) -> Self {
         let border: Vec<Option<bool>> = (0..cells.covered.len()).map(|at| smooth_border(cells, smooth, at)).collect();
         let is_border: Vec<bool> = border.iter().map(Option::is_some).collect();

@@ -103,8 +103,8 @@ fn two_steps_leave_the_common_rows() {
     assert_eq!(kept(&steps, Crop::None, rough), None);
 }
 
-/// A wide photograph, and a narrower one above it that leaves 80 columns empty: to lose these columns costs 20000 pixels, to
-/// lose the rows above 16000.
+/// A wide photograph, and a narrower one above it that leaves 80 columns empty: to lose these columns costs 20000
+/// pixels, to lose the rows above 16000.
 fn with_a_tower() -> CanvasLayout {
     layout(400, 300, &[upright(0.0, 50.0, 400.0, 300.0), upright(80.0, 0.0, 400.0, 200.0)])
 }
@@ -144,8 +144,8 @@ fn what_is_missing_of_a_smooth_sky_costs_nothing() {
     assert_eq!(kept(&steps, Crop::Auto, ground), Some(Rectangle { columns: 0..190, rows: 0..60 }));
 }
 
-/// A tower rises into rows that end beside it: over the sky there, in whose border a cloud's edge lies at one place, what is
-/// missing is filled, so that the tower keeps its top; over the crown of a tree it is not.
+/// A tower rises into rows that end beside it: over the sky there, in whose border a cloud's edge lies at one place,
+/// what is missing is filled, so that the tower keeps its top; over the crown of a tree it is not.
 #[test]
 fn the_edge_of_a_cloud_costs_no_tower_its_top() {
     let layout = layout(400, 300, &[upright(0.0, 30.0, 400.0, 300.0), upright(0.0, 0.0, 150.0, 200.0)]);
@@ -163,8 +163,8 @@ fn the_edge_of_a_cloud_costs_no_tower_its_top() {
     assert!(tree.rows.start >= 30 || tree.columns.end <= 200, "{tree:?}");
 }
 
-/// A tower rises above a wall into rows that end beside it, under clouds of 11 levels from cell to cell: too uneven to be filled, except
-/// that the tower keeps its top. Where cells themselves are uneven, by 12 levels, it does not.
+/// A tower rises above a wall into rows that end beside it, under clouds of 11 levels from cell to cell: too uneven to
+/// be filled, except that the tower keeps its top. Where cells themselves are uneven, by 12 levels, it does not.
 #[test]
 fn clouds_are_filled_for_a_tower_to_keep_its_top() {
     let layout = layout(400, 300, &[upright(0.0, 60.0, 400.0, 300.0), upright(0.0, 0.0, 200.0, 200.0)]);
@@ -182,8 +182,8 @@ fn clouds_are_filled_for_a_tower_to_keep_its_top() {
     assert_eq!((crowns.columns, crowns.rows.start), (0..400, 60));
 }
 
-/// A tower in an even sky bears a mast of a column of pixels, 6 levels darker than the sky, into rows that end beside it: it is kept, and the
-/// sky beside it filled. Without it, and where it runs out of the photograph, they are not.
+/// A tower in an even sky bears a mast of a column of pixels, 6 levels darker than the sky, into rows that end beside
+/// it: it is kept, and the sky beside it filled. Without it, and where it runs out of the photograph, they are not.
 #[test]
 fn a_tower_keeps_its_mast() {
     let layout = layout(500, 130, &[upright(0.0, 30.0, 500.0, 130.0), upright(200.0, 0.0, 300.0, 100.0)]);
@@ -207,8 +207,8 @@ fn a_tower_keeps_its_mast() {
     assert!(with_mast.start <= 12 && with_mast.end == 130, "{with_mast:?}");
 }
 
-/// Beside an even sky the corner that is missing is filled; where a post runs out of the photograph below, it is not, unless that would keep
-/// too little.
+/// Beside an even sky the corner that is missing is filled; where a post runs out of the photograph below, it is not,
+/// unless that would keep too little.
 #[test]
 fn a_post_does_not_end_in_front_of_what_is_filled() {
     let layout = layout(400, 300, &[upright(0.0, 30.0, 400.0, 300.0), upright(0.0, 0.0, 300.0, 200.0)]);
@@ -292,7 +292,8 @@ fn holes_are_seen() {
     assert_eq!(coverage.in_cells(50), [2500, 2500 - 400, 1000, 500, 500, 200]);
 }
 
-/// The cells of a full turn of 90 x 60, with things all along it, and an empty hole across its cut, turned by so many columns.
+/// The cells of a full turn of 90 x 60, with things all along it, and an empty hole across its cut, turned by so many
+/// columns.
 fn turned(by: usize) -> Cells {
     const SIZE: [usize; 2] = [90, 60];
     let [columns, rows] = SIZE;

@@ -3,10 +3,11 @@
 use super::cells::Cells;
 use crate::window::near;
 
-/// Contrast of neighboring cells from which on an edge is a full one, levels: that of a gray stone wall beside a gray sky.
+/// Contrast of neighboring cells from which on an edge is a full one, levels: that of a gray stone wall beside a gray
+/// sky.
 const FULL_EDGE: f32 = 40.0;
-/// Half the side of the square over which edges make a thing, as a share of the panorama's longer side: that of a head in a
-/// street.
+/// Half the side of the square over which edges make a thing, as a share of the panorama's longer side: that of a head
+/// in a street.
 const THING: f64 = 0.006;
 /// Half the side of a thing's surroundings, as a share of the panorama's longer side.
 const SURROUNDINGS: f64 = 0.05;
@@ -18,14 +19,16 @@ const CROWDED: f32 = 2.0;
 /// [`HEADROOM`] ends there.
 const THERE: f32 = 0.2;
 const CALM: f32 = 0.1;
-/// Calm above a thing that shows that it ends there, as a share of the panorama's longer side; half of it is to be kept.
+/// Calm above a thing that shows that it ends there, as a share of the panorama's longer side; half of it is to be
+/// kept.
 const HEADROOM: f64 = 0.012;
-/// Strength of an edge from which on a line alone in front of what is calm is seen, as a mast before a sky (4 levels), and up to which what is
-/// beside it is calm (2 levels). Adobe-shanghai-tiny's spire is kept with 0.07 to 0.13 and 0.03 to 0.09.
+/// Strength of an edge from which on a line alone in front of what is calm is seen, as a mast before a sky (4 levels),
+/// and up to which what is beside it is calm (2 levels). Adobe-shanghai-tiny's spire is kept with 0.07 to 0.13 and 0.03
+/// to 0.09.
 const LINE_EDGE: f32 = 0.1;
 const BESIDE_LINE: f32 = 0.05;
-/// Columns from the middle of such a line to what is beside it, as a share of the panorama's longer side: a mast, and the slope of its edges.
-/// With 0.005 that spire is lost, with 0.007 and 0.01 it is kept.
+/// Columns from the middle of such a line to what is beside it, as a share of the panorama's longer side: a mast, and
+/// the slope of its edges. With 0.005 that spire is lost, with 0.007 and 0.01 it is kept.
 const LINE_REACH: f64 = 0.008;
 /// Half the width of the skyline over which a thing stands out, as a share of the panorama's longer side.
 const SKYLINE: f64 = 0.1;
@@ -86,8 +89,8 @@ fn edge(cells: &Cells, at: usize) -> f32 {
     (strongest / FULL_EDGE).min(1.0)
 }
 
-/// Means over those cells that are `counted` of a square of `2 * reach + 1` cells around each, across the ends of a full turn, too; 0 without
-/// any.
+/// Means over those cells that are `counted` of a square of `2 * reach + 1` cells around each, across the ends of a
+/// full turn, too; 0 without any.
 pub(super) fn box_means(values: &[f32], counted: &[bool], cells: &Cells, reach: usize) -> Vec<f32> {
     let (columns, rows) = (cells.columns, cells.rows);
     // A full turn is unrolled, so far that no cell counts twice.
@@ -163,7 +166,8 @@ struct LineAbove<'a> {
 }
 
 impl LineAbove<'_> {
-    /// The column and row of cells up to which a line goes on from those given, along the strongest edges; the same if there is none.
+    /// The column and row of cells up to which a line goes on from those given, along the strongest edges; the same if
+    /// there is none.
     fn tip(&self, [mut x, mut y]: [usize; 2]) -> [usize; 2] {
         let Self { cells, edges, .. } = self;
         while let Some(above) = y.checked_sub(1) {

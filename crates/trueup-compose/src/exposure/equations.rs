@@ -1,9 +1,9 @@
 //! The equations that the overlaps are.
 //!
-//! Brightness, vignetting and response first: unknowns x_k (ln gain of photograph k), a_c (coefficients of camera c) and b
-//! (of the response), one equation per sample, `x_i - x_j + a (p(r_i) - p(r_j)) + b (f(e_i) - f(e_j)) = -ln(I_i / I_j)`,
-//! with weights from the residuals. The color cast follows with the same weights: the same equations for what each channel
-//! differs from the mean.
+//! Brightness, vignetting and response first: unknowns x_k (ln gain of photograph k), a_c (coefficients of camera c)
+//! and b (of the response), one equation per sample,
+//! `x_i - x_j + a (p(r_i) - p(r_j)) + b (f(e_i) - f(e_j)) = -ln(I_i / I_j)`, with weights from the residuals. The color
+//! cast follows with the same weights: the same equations for what each channel differs from the mean.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -17,26 +17,27 @@ use super::samples::Shared;
 use super::solution::Solution;
 use crate::light::{RESPONSE_TERMS, Response, VIGNETTING_TERMS};
 
-/// How far gains are expected to lie from 1, as a standard deviation of their natural logarithm. Lower keeps long rows of
-/// photographs from drifting in brightness, higher follows the measured ratios.
+/// How far gains are expected to lie from 1, as a standard deviation of their natural logarithm. Lower keeps long rows
+/// of photographs from drifting in brightness, higher follows the measured ratios.
 const GAIN_DEVIATION: f64 = 2.0;
 
 /// How far a channel's gain is expected to lie from the mean of the channels, as a standard deviation of natural
 /// logarithms. Lower keeps long rows of photographs from drifting in color.
 const CAST_DEVIATION: f64 = 0.2;
 
-/// How strong vignetting is expected to be, as a standard deviation of every coefficient of its natural logarithm. Lower
-/// trusts that the lenses are good, higher follows the overlaps.
+/// How strong vignetting is expected to be, as a standard deviation of every coefficient of its natural logarithm.
+/// Lower trusts that the lenses are good, higher follows the overlaps.
 const VIGNETTING_DEVIATION: f64 = 0.6;
 
-/// How far the response is expected to lie from the color profile's curve, as a standard deviation of every coefficient of
-/// its natural logarithm.
+/// How far the response is expected to lie from the color profile's curve, as a standard deviation of every coefficient
+/// of its natural logarithm.
 const RESPONSE_DEVIATION: f64 = 0.5;
 
 /// Neighboring samples see the same things; an overlap is worth about this share of its samples.
 const INDEPENDENT: f64 = 0.01;
 
-/// By how much the mean slope of the response may differ from the profile's, both on logarithms: none, but for rounding.
+/// By how much the mean slope of the response may differ from the profile's, both on logarithms: none, but for
+/// rounding.
 const POWER_DEVIATION: f64 = 1e-3;
 
 /// All overlaps, and what is unknown.

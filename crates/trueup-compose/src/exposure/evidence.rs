@@ -56,7 +56,8 @@ impl Line {
 }
 
 impl LightEquations<'_> {
-    /// By how much the functions of the response differ in every sample, by what the solution says the photographs show.
+    /// By how much the functions of the response differ in every sample, by what the solution says the photographs
+    /// show.
     pub(super) fn predict(&self, solution: &mut Solution, profile: &TransferCurve) -> Result<()> {
         let predicted = Predicted::new(profile, &solution.response)?;
         let of = |one: &Observed| -> (Vec<Differences>, Line) {
@@ -79,8 +80,8 @@ impl LightEquations<'_> {
         Ok(())
     }
 
-    /// What the response does to the ratios of photographs: the root of the mean square of what it adds to their logarithms,
-    /// but for what is the same all over an overlap, which gains do as well.
+    /// What the response does to the ratios of photographs: the root of the mean square of what it adds to their
+    /// logarithms, but for what is the same all over an overlap, which gains do as well.
     pub(super) fn effect(&self, weights: &[Vec<f64>], solution: &Solution) -> f64 {
         let (mut squares, mut total) = (0.0, 0.0);
         for (index, (one, weights)) in self.observed.iter().zip(weights).enumerate() {

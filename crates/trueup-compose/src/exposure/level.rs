@@ -24,8 +24,8 @@ const STOP_FROM_REFERENCE: f64 = 0.01;
 /// exposure is no surer.
 const STOPS_FREE: f64 = 1.0;
 
-/// Share of a photograph's pixels that a further stop is worth: the tones of a photograph fill some five stops, of which
-/// cameras choose those that matter.
+/// Share of a photograph's pixels that a further stop is worth: the tones of a photograph fill some five stops, of
+/// which cameras choose those that matter.
 const FURTHER_STOP: f64 = 0.05;
 
 /// What decides the level of a panorama.
@@ -46,10 +46,11 @@ struct Sample {
 }
 
 impl LevelInput<'_> {
-    /// Natural logarithm of a factor on all photographs, so that the least of them is lost: of their pixels as few as can be
-    /// turn white or black that were not when they were taken, and few photographs are shown much brighter or darker than
-    /// they were taken; each counts the same, as the look shows it. The level lies between those of the photographs, so that photographs of one
-    /// exposure stay as they are, and it is that of the reference if another gains next to nothing.
+    /// Natural logarithm of a factor on all photographs, so that the least of them is lost: of their pixels as few as
+    /// can be turn white or black that were not when they were taken, and few photographs are shown much brighter or
+    /// darker than they were taken; each counts the same, as the look shows it. The level lies between those of the
+    /// photographs, so that photographs of one exposure stay as they are, and it is that of the reference if another
+    /// gains next to nothing.
     pub(super) fn log_factor(&self) -> f64 {
         let compared = self.corrections.photographs.iter().zip(self.compared).filter(|(_, compared)| **compared);
         let own: Vec<f64> = compared.map(|(correction, _)| -correction.brightness().log2()).collect();
@@ -113,7 +114,8 @@ fn brightest(light: &LightTable, pixel: &[u8], [x, y]: [f32; 2]) -> Option<Sampl
     (level > BLACK && level < WHITE).then(|| Sample { light: light.linearize.linear(f32::from(level)), factor })
 }
 
-/// The share of the photographs' pixels beyond the ends of light, `black` and `white`, if each is brightened by the stops beside it.
+/// The share of the photographs' pixels beyond the ends of light, `black` and `white`, if each is brightened by the
+/// stops beside it.
 fn lost<'a>(photographs: impl Iterator<Item = (&'a Vec<Sample>, f64)>, [black, white]: [f32; 2]) -> f64 {
     let (mut shares, mut count) = (0.0, 0.0_f64);
     for (samples, stops) in photographs.filter(|(samples, _)| !samples.is_empty()) {
@@ -129,7 +131,8 @@ fn lost<'a>(photographs: impl Iterator<Item = (&'a Vec<Sample>, f64)>, [black, w
 }
 
 impl Corrections {
-    /// With no photograph of those that were compared farther than the factor `largest` from the median one, brighter or darker; and whether one was.
+    /// With no photograph of those that were compared farther than the factor `largest` from the median one, brighter
+    /// or darker; and whether one was.
     ///
     /// How far photographs lie apart has nothing to do with how bright the panorama is shown.
     pub(super) fn limited(mut self, compared: &[bool], largest: f64) -> (Self, bool) {
@@ -194,7 +197,8 @@ mod tests {
         assert_eq!(all.clone().limited(&[true; 3], 2.0), (all, false));
     }
 
-    /// A turn in sun and shade: two in the sun, a hundredth of the light of those in the shade, which a level in the sun brought to the limit before.
+    /// A turn in sun and shade: two in the sun, a hundredth of the light of those in the shade, which a level in the
+    /// sun brought to the limit before.
     #[test]
     fn photographs_are_limited_by_their_distance_from_one_another() {
         let turn = [0.01, 0.01, 0.1, 0.1, 1.0, 1.0];
@@ -202,7 +206,8 @@ mod tests {
             let gains = turn.map(|gain| level * gain);
             assert_eq!(corrections(&gains).limited(&[true; 6], 32.0), (corrections(&gains), false));
         }
-        // The geometric mean of 2 and 8 is 4, of which 0.25 and 64 are a sixteenth and sixteen times; the last was compared with none.
+        // The geometric mean of 2 and 8 is 4, of which 0.25 and 64 are a sixteenth and sixteen times; the last was
+        // compared with none.
         let (limited, is_limited) =
             corrections(&[0.25, 2.0, 8.0, 64.0, 1e6]).limited(&[true, true, true, true, false], 8.0);
         assert!(is_limited);
@@ -234,8 +239,8 @@ mod tests {
     #[test]
     fn pixels_count_as_lost_by_what_they_become() {
         let samples = |lights: &[f32]| lights.iter().map(|&light| Sample { light, factor: 2.0 }).collect::<Vec<_>>();
-        // Of the first, 0.6 and 0.8 become 1.2 / (1 + 15 * 0.1296)^(1/4) = 0.916 and 1.6 / (1 + 15 * 0.4096)^(1/4) = 0.978,
-        // and 0.001 becomes 0.002. The second loses nothing, the third is none.
+        // Of the first, 0.6 and 0.8 become 1.2 / (1 + 15 * 0.1296)^(1/4) = 0.916 and 1.6 / (1 + 15 * 0.4096)^(1/4) =
+        // 0.978, and 0.001 becomes 0.002. The second loses nothing, the third is none.
         let photographs = [samples(&[0.001, 0.1, 0.6, 0.8]), samples(&[0.1, 0.2]), Vec::new()];
         let lost_at = |stops: [f64; 3]| lost(photographs.iter().zip(stops), [0.0025, 0.95]);
         assert_eq!(lost_at([0.0; 3]), 0.25);

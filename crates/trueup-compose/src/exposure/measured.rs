@@ -19,8 +19,8 @@ pub struct ExposureInput<'a> {
     /// Position of the photograph that [`GainAnchor::Reference`](super::GainAnchor::Reference) keeps, and whose colors
     /// [`GainAnchor::Scene`](super::GainAnchor::Scene) does.
     pub reference: usize,
-    /// How much of the differences the panorama evens out: [`GainAnchor::Scene`](super::GainAnchor::Scene) is the level at which least is
-    /// lost of what it shows then.
+    /// How much of the differences the panorama evens out: [`GainAnchor::Scene`](super::GainAnchor::Scene) is the level
+    /// at which least is lost of what it shows then.
     pub look: Look,
 }
 

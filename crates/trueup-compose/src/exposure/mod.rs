@@ -1,10 +1,10 @@
 //! One look for all photographs: gain, color cast and vignetting, estimated together where photographs overlap.
 //!
-//! All factors act on linear light, so that they add up as logarithms: what photograph i shows of a place, times its gain,
-//! times its lens's correction there, equals the same of photograph j. The overlaps give one such equation per sample and
-//! channel; moving things and ghosts are weighed down by their residuals, saturated samples do not take part. What is linear
-//! light is estimated, too, as a [`Response`] beside the color profile's curve. The reference keeps its colors, but for its
-//! vignetting; how bright the whole is, all photographs decide.
+//! All factors act on linear light, so that they add up as logarithms: what photograph i shows of a place, times its
+//! gain, times its lens's correction there, equals the same of photograph j. The overlaps give one such equation per
+//! sample and channel; moving things and ghosts are weighed down by their residuals, saturated samples do not take
+//! part. What is linear light is estimated, too, as a [`Response`] beside the color profile's curve. The reference
+//! keeps its colors, but for its vignetting; how bright the whole is, all photographs decide.
 
 mod equations;
 mod evidence;
@@ -39,21 +39,21 @@ const STAGE: &str = ExposureOptions::STAGE;
 /// Estimates the corrections of photographs from their reduced copies.
 ///
 /// # Errors
-/// [`Error::Options`]; [`Error::Input`] if thumbnails and layout do not fit together; [`Error::Unsolvable`] if a vertex is
-/// not finite; [`Error::Cancelled`].
+/// [`Error::Options`]; [`Error::Input`] if thumbnails and layout do not fit together; [`Error::Unsolvable`] if a vertex
+/// is not finite; [`Error::Cancelled`].
 ///
 /// # Source
 /// Gains: Brown, Lowe, "Automatic panoramic image stitching using invariant features", IJCV 74(1), 2007, section 6.
 /// Vignetting from overlaps: Goldman, Chen, "Vignette and exposure calibration and compensation", ICCV 2005 (even
 /// polynomial of the sixth degree, exposures and lens together). Response from unknown exposures: Mitsunaga, Nayar,
-/// "Radiometric self calibration", CVPR 1999; that a power of it cannot be known: Grossberg, Nayar, "Determining the camera
-/// response from images: what is knowable?", TPAMI 25(11), 2003.
+/// "Radiometric self calibration", CVPR 1999; that a power of it cannot be known: Grossberg, Nayar, "Determining the
+/// camera response from images: what is knowable?", TPAMI 25(11), 2003.
 ///
 /// # Departures
 /// All errors are on logarithms, where the whole model is linear; the published error of the gains on intensities draws
-/// them towards zero and is led by bright outliers. The response is a correction of the transfer curve of the photographs' color
-/// space, one for all channels, whose mean slope stays that of the curve; its functions are read off the light that both
-/// photographs together say, not off each one's own noisy sample.
+/// them towards zero and is led by bright outliers. The response is a correction of the transfer curve of the
+/// photographs' color space, one for all channels, whose mean slope stays that of the curve; its functions are read off
+/// the light that both photographs together say, not off each one's own noisy sample.
 pub fn run(input: &ExposureInput<'_>, options: &ExposureOptions, context: &StageContext) -> Result<Exposure> {
     check(input, options)?;
     let &ExposureInput { layout, thumbnails, reference, look } = input;
@@ -140,10 +140,12 @@ fn check(input: &ExposureInput<'_>, options: &ExposureOptions) -> Result<()> {
 
 /// Samples taken across a photograph, about, when the overlaps are compared.
 const SAMPLES: f64 = 10_000.0;
-/// Samples taken across all photographs, about, at most: 64 MB. Each of a thousand still has several times as many as are kept of its overlaps.
+/// Samples taken across all photographs, about, at most: 64 MB. Each of a thousand still has several times as many as
+/// are kept of its overlaps.
 const SAMPLES_OF_ALL: f64 = 4e6;
 
-/// Factor from the canvas to the grid of samples, at most 1: the median photograph gets [`SAMPLES`] of them, or its part of [`SAMPLES_OF_ALL`].
+/// Factor from the canvas to the grid of samples, at most 1: the median photograph gets [`SAMPLES`] of them, or its
+/// part of [`SAMPLES_OF_ALL`].
 fn sampling_scale(layout: &CanvasLayout) -> f64 {
     let mut areas: Vec<f64> = layout
         .placed

@@ -25,21 +25,22 @@ trueup_core::choice! {
 trueup_core::options! {
     /// How brightness, color and vignetting of the photographs are evened out.
     pub struct ExposureOptions("exposure") {
-        /// Whether anything is evened out at all. Switch it off for photographs that were evened out before, or to see their own
-        /// light.
+        /// Whether anything is evened out at all. Switch it off for photographs that were evened out before, or to see
+        /// their own light.
         enabled: bool = true, Allowed::Any, "", basic;
-        /// What may differ between the photographs. Choose `gain` if color casts are wanted as they are, or if vignetting was
-        /// corrected before and there are few overlaps to tell it from the scene.
+        /// What may differ between the photographs. Choose `gain` if color casts are wanted as they are, or if
+        /// vignetting was corrected before and there are few overlaps to tell it from the scene.
         model: ExposureModel = ExposureModel::Full, Allowed::Any, "";
-        /// Which photograph's look the panorama keeps. Choose `reference` to have one photograph stay as it was taken, however
-        /// bright or dark it is, `mean` for the middle of all.
+        /// Which photograph's look the panorama keeps. Choose `reference` to have one photograph stay as it was taken,
+        /// however bright or dark it is, `mean` for the middle of all.
         anchor: GainAnchor = GainAnchor::Scene, Allowed::Any, "";
-        /// Whether the cameras' response is estimated beside the full model, one for all photographs; without, their samples
-        /// are taken for light by the color profile's curve. Switch it off for photographs whose samples are known to follow
-        /// their profile, such as developed raw files.
+        /// Whether the cameras' response is estimated beside the full model, one for all photographs; without, their
+        /// samples are taken for light by the color profile's curve. Switch it off for photographs whose samples are
+        /// known to follow their profile, such as developed raw files.
         response: bool = true, Allowed::Any, "";
-        /// Largest gain beside the median photograph's; the smallest is its inverse. Photographs of sun and shade that each were
-        /// exposed for what they show lie up to five stops from it. Lower it if a photograph that is nearly black comes out as noise.
+        /// Largest gain beside the median photograph's; the smallest is its inverse. Photographs of sun and shade that
+        /// each were exposed for what they show lie up to five stops from it. Lower it if a photograph that is nearly
+        /// black comes out as noise.
         max_gain: f64 = 32.0, between(1.0, 1000.0), "";
     }
 }

@@ -9,11 +9,13 @@ use super::samples::Shared;
 /// Fewest samples two photographs must share to be compared.
 const MIN_SHARED: usize = 20;
 
-/// Samples that are kept of an overlap, at most. Neighboring samples say the same; a few hundred of an overlap settle seven unknowns.
+/// Samples that are kept of an overlap, at most. Neighboring samples say the same; a few hundred of an overlap settle
+/// seven unknowns.
 const KEPT: usize = 600;
 
-/// Samples that are kept of all overlaps, about: 110 MB while the light is evened out, of up to 2000 overlaps as many as of one. Where there are more,
-/// every photograph has several, and in all of them together still more samples than one of a pair.
+/// Samples that are kept of all overlaps, about: 110 MB while the light is evened out, of up to 2000 overlaps as many
+/// as of one. Where there are more, every photograph has several, and in all of them together still more samples than
+/// one of a pair.
 const KEPT_OF_ALL: usize = 1_200_000;
 
 /// Samples that are kept of each of so many overlaps.

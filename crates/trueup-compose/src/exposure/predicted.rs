@@ -1,9 +1,9 @@
 //! What the photographs of an overlap should show, and what that means for the response.
 //!
-//! The functions of the response are not read off the samples themselves. Noise and misalignment move a sample's light and
-//! its functions together, so that the response which presses all contrast together would seem to fit best. They are read
-//! off what both photographs together say of the light, through each one's own factors: two photographs of the same
-//! exposure then say nothing about the response, as is right.
+//! The functions of the response are not read off the samples themselves. Noise and misalignment move a sample's light
+//! and its functions together, so that the response which presses all contrast together would seem to fit best. They
+//! are read off what both photographs together say of the light, through each one's own factors: two photographs of the
+//! same exposure then say nothing about the response, as is right.
 
 use trueup_core::Result;
 use trueup_core::color::TransferCurve;
@@ -13,8 +13,8 @@ use crate::light::{RESPONSE_TERMS, Response};
 /// Steps between the darkest light and white; the functions change by less than a hundredth between two of them.
 const STEPS: usize = 1024;
 
-/// Steps of the curve that the response makes of the profile, sixteen for every 8-bit level: between two of them its chord is
-/// off by less than a millionth of full scale in encoded values, and the functions by a few millionths.
+/// Steps of the curve that the response makes of the profile, sixteen for every 8-bit level: between two of them its
+/// chord is off by less than a millionth of full scale in encoded values, and the functions by a few millionths.
 const CURVE_STEPS: usize = 4080;
 
 /// Natural logarithm of the darkest light told apart, below half an 8-bit level of the usual curves.
@@ -41,8 +41,9 @@ impl Predicted {
         })
     }
 
-    /// The response's functions for two photographs that show a place in `light` by the profile, if `factors` make their
-    /// corrected light the same; both are natural logarithms. `variances` say how sure each photograph's light is.
+    /// The response's functions for two photographs that show a place in `light` by the profile, if `factors` make
+    /// their corrected light the same; both are natural logarithms. `variances` say how sure each photograph's light
+    /// is.
     pub(super) fn terms(&self, light: [f64; 2], factors: [f64; 2], variances: [f32; 2]) -> [[f64; RESPONSE_TERMS]; 2] {
         let corrected = [0, 1].map(|side| light[side] + at(&self.added, light[side])[0] + factors[side]);
         // The mean by the variances is independent of the difference: the surer photograph says what there is.

@@ -1,4 +1,5 @@
-//! Known light, found again: photographs of a scene are made with gains, casts, vignetting, noise and a response that are known.
+//! Known light, found again: photographs of a scene are made with gains, casts, vignetting, noise and a response that
+//! are known.
 
 use trueup_core::color::TransferCurve;
 use trueup_core::mesh::GridMesh;
@@ -153,8 +154,8 @@ fn known_gains_and_vignetting_are_recovered_within_two_percent() {
     }
 }
 
-/// How far what is found of the response is from the `truth` (light by encoded value), but for a power and a factor, which
-/// gains make up for: the largest difference of natural logarithms over the levels from 25 to 242.
+/// How far what is found of the response is from the `truth` (light by encoded value), but for a power and a factor,
+/// which gains make up for: the largest difference of natural logarithms over the levels from 25 to 242.
 fn response_error(found: &Response, truth: impl Fn(f64) -> f64) -> f64 {
     let points: Vec<[f64; 2]> = (25..=242)
         .map(|level| {
@@ -173,7 +174,8 @@ fn response_error(found: &Response, truth: impl Fn(f64) -> f64) -> f64 {
 fn the_response_is_recovered_from_three_exposures() {
     let exposures = [1.0, 0.5, 2.0, 0.5, 2.0, 1.0];
     let lights = exposures.map(|gain| Light { gain: [gain; 3], vignetting: [-0.2, -0.1, 0.0] });
-    // An S, light by encoded value, and a film's: 1 - exp(-2.5 l), stretched to end at white, whose inverse is a logarithm.
+    // An S, light by encoded value, and a film's: 1 - exp(-2.5 l), stretched to end at white, whose inverse is a
+    // logarithm.
     let s_shaped = Response { coefficients: [0.0, -0.5, 0.4, 0.1] }.curve(&TransferCurve::SRGB).expect("a curve");
     let white = 1.0 - f64::exp(-2.5);
     let film = |e: f64| -(1.0 - white * TransferCurve::SRGB.linear(e)).ln() / 2.5;
@@ -206,8 +208,8 @@ fn no_response_drives_gains_to_their_limit() {
     assert_eq!(limited, found(&lights, by_film, 1, &without));
 }
 
-/// A profile that stands still for some levels, where the response falls: together they make no curve, and so the profile stays
-/// as it is.
+/// A profile that stands still for some levels, where the response falls: together they make no curve, and so the
+/// profile stays as it is.
 #[test]
 fn a_response_that_makes_no_curve_with_the_profile_is_left_out() {
     let exposures = [1.0, 0.5, 2.0, 0.5, 2.0, 1.0];
@@ -236,7 +238,8 @@ fn a_shoulder_is_told_from_hard_clipping() {
     let of = |exposures: [f64; PLACES.len()]| exposures.map(|gain| Light { gain: [gain; 3], vignetting: [0.0; 3] });
     let three = of([1.0, 0.5, 2.0, 0.5, 2.0, 1.0]);
     let hard = |light: f64| TransferCurve::SRGB.encoded(light);
-    // Of two exposures a factor f apart, y and f y / (1 + s (f^4 - 1) y^4)^(1/4) are the same light, with s = k / (1 + k).
+    // Of two exposures a factor f apart, y and f y / (1 + s (f^4 - 1) y^4)^(1/4) are the same light, with s = k / (1 +
+    // k).
     let levelled = |k: f64| {
         move |light: f64| TransferCurve::SRGB.encoded(light * ((1.0 + k) / (1.0 + k * light.powi(4))).powf(0.25))
     };

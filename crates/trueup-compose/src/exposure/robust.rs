@@ -3,7 +3,8 @@
 use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median};
 
 /// Residual, in standard deviations of the overlap, at which a sample counts half. Tuning constant of the Cauchy
-/// estimator for 95 % efficiency (Holland, Welsch, "Robust regression using iteratively reweighted least-squares", 1977).
+/// estimator for 95 % efficiency (Holland, Welsch, "Robust regression using iteratively reweighted least-squares",
+/// 1977).
 const CAUCHY: f64 = 2.385;
 
 /// Smallest standard deviation of a sample's logarithm: half a level of 8 bits at middle gray.

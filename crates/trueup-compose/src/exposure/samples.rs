@@ -135,7 +135,8 @@ pub(super) fn shared(first: &Patch, second: &Patch, turn: Option<usize>) -> Vec<
     ahead.chain(behind).collect()
 }
 
-/// The rows and columns of both photographs if the second is moved to the right by some columns; `None` if there are none.
+/// The rows and columns of both photographs if the second is moved to the right by some columns; `None` if there are
+/// none.
 fn window_ahead(first: &Patch, second: &Patch, by: usize) -> Option<(Range<usize>, Range<usize>)> {
     let rows = common(&first.rows, &second.rows);
     let columns = common(&first.columns, &(second.columns.start + by..second.columns.end + by));
@@ -156,8 +157,8 @@ fn shared_ahead(first: &Patch, second: &Patch, by: usize) -> Vec<Shared> {
         .collect()
 }
 
-/// Natural logarithm of the mean linear light of blocks of `block` x `block` pixels, by channel; NaN where a sample lies
-/// outside `telling`.
+/// Natural logarithm of the mean linear light of blocks of `block` x `block` pixels, by channel; NaN where a sample
+/// lies outside `telling`.
 fn block_means(raster: &Raster<u8>, linearize: &Linearize, block: usize, telling: RangeInclusive<u8>) -> Raster<f32> {
     let (width, height) = (raster.width().div_ceil(block), raster.height().div_ceil(block));
     let mut means = Raster::new(width, height, 3);

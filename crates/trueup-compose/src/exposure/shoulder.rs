@@ -8,9 +8,10 @@ use super::overlap::Observed;
 use super::solution::Solution;
 use crate::light::LEAST_WHITE;
 
-/// What is believed of a whole shoulder before anything is seen, in the units of [`Agreement`]: as if two hundred channels of samples that a shoulder would
-/// move by 0.03 had shown one, or eight that it would move by 0.16. Logarithms of bright samples err by 0.05, a twentieth of them is independent,
-/// and without them a share of 1 is known to 0.5.
+/// What is believed of a whole shoulder before anything is seen, in the units of [`Agreement`]: as if two hundred
+/// channels of samples that a shoulder would move by 0.03 had shown one, or eight that it would move by 0.16.
+/// Logarithms of bright samples err by 0.05, a twentieth of them is independent, and without them a share of 1 is known
+/// to 0.5.
 const BELIEF_IN_A_WHOLE: f64 = 0.2;
 
 /// By how much a shoulder would move the logarithms of bright samples, and by how much they are moved.
@@ -23,8 +24,9 @@ struct Agreement {
 }
 
 impl LightEquations<'_> {
-    /// The share of a shoulder that the overlaps show: what the photograph that was exposed longer shows of bright things is darker than its factor
-    /// says if its camera levels them off, and just as bright if it clips hard. 1 where nothing bright is shown by two exposures.
+    /// The share of a shoulder that the overlaps show: what the photograph that was exposed longer shows of bright
+    /// things is darker than its factor says if its camera levels them off, and just as bright if it clips hard. 1
+    /// where nothing bright is shown by two exposures.
     pub(super) fn shoulder(&self, weights: &[Vec<f64>], solution: &Solution, profile: &TransferCurve) -> f64 {
         let overlaps = self.observed.par_iter().zip(weights);
         let agreements: Vec<Agreement> =

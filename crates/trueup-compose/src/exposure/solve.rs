@@ -69,8 +69,8 @@ pub(super) fn solve(input: &SolveInput<'_>, options: &ExposureOptions, context: 
         }
         solution.casts = problem.casts(&weights, &solution);
     }
-    // Gains grow with a response that stretches the light. At their limit photographs do not fit any longer, which is worse
-    // than what a response is good for.
+    // Gains grow with a response that stretches the light. At their limit photographs do not fit any longer, which is
+    // worse than what a response is good for.
     let (corrections, limited) = problem.corrections(&solution, input);
     let makes_curve = profile.is_none_or(|profile| corrections.response.curve(profile).is_ok());
     if !makes_curve || (!corrections.response.is_plain() && limited) {
@@ -93,7 +93,8 @@ fn without_response(
 }
 
 impl LightEquations<'_> {
-    /// Gains relative to the anchor, the vignetting of each photograph's lens, and the response; and whether gains had to be limited.
+    /// Gains relative to the anchor, the vignetting of each photograph's lens, and the response; and whether gains had
+    /// to be limited.
     fn corrections(&self, solution: &Solution, input: &SolveInput<'_>) -> (Corrections, bool) {
         let &SolveInput { thumbnails, reference, look, .. } = input;
         let mut compared = vec![false; self.count];
@@ -131,7 +132,8 @@ impl LightEquations<'_> {
         solution.brightness[index] + solution.casts[channel][index]
     }
 
-    /// The corrections without limits; gains whose logarithms are `anchor` become 1, and those of what was not compared are.
+    /// The corrections without limits; gains whose logarithms are `anchor` become 1, and those of what was not compared
+    /// are.
     fn relative_to(&self, anchor: [f64; 3], solution: &Solution, compared: &[bool]) -> Corrections {
         let correction = |index: usize| {
             let lens = self.count + self.lens_of[index] * self.terms;

@@ -75,7 +75,8 @@ fn photograph_around(shift: usize, gain: f64) -> Raster<u8> {
     Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples")
 }
 
-/// Two photographs on a cylinder of 480 columns, the second 300 to the right of the first: they meet only across the ends.
+/// Two photographs on a cylinder of 480 columns, the second 300 to the right of the first: they meet only across the
+/// ends.
 #[test]
 fn overlaps_across_the_ends_of_a_full_turn_count() {
     let rasters = [photograph_around(0, 1.0), photograph_around(300, 0.7)];
@@ -223,7 +224,8 @@ fn a_dark_reference_does_not_make_the_panorama_dark() {
     };
     let (scene, reference) = (by_anchor(GainAnchor::Scene), by_anchor(GainAnchor::Reference));
     assert!(reference[1] < 0.08, "{reference:?}");
-    // The others cost nothing from a stop below their exposure on, which is where the stops from the reference are fewest.
+    // The others cost nothing from a stop below their exposure on, which is where the stops from the reference are
+    // fewest.
     assert!((scene[1] / 0.5 - 1.0).abs() < 0.1, "{scene:?}");
     for (one, other) in scene.iter().zip(&reference) {
         assert!((one / other / (scene[0] / reference[0]) - 1.0).abs() < 1e-9);

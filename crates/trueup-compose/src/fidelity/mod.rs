@@ -1,8 +1,9 @@
 //! How true the panorama is to the photographs it was made of: steps across seams, and ghosts.
 //!
 //! Both measures ask, wherever two photographs lie on each other, how far the panorama's gradient is from that of the
-//! photograph it resembles most there. A panorama that shows one photograph at a time has a distance of 0 but at its seams;
-//! a mean of photographs that do not fit shows the contours of both, each at half its strength, and is far from either.
+//! photograph it resembles most there. A panorama that shows one photograph at a time has a distance of 0 but at its
+//! seams; a mean of photographs that do not fit shows the contours of both, each at half its strength, and is far from
+//! either.
 
 mod ghosts;
 mod measured;
@@ -45,18 +46,18 @@ pub struct Fidelity {
 /// that each canvas pixel shows, or shows most, row by row.
 ///
 /// The step at a place on a line between two photographs is the mean of the eight pixels on one side minus that of the
-/// eight on the other, where both photographs cover all sixteen. It is averaged over the places of a line within a square
-/// of 32 pixels: what the eye takes for a seam has one sign along it, while contours that are a little out of place change
-/// theirs. The panorama's is then compared with that of both photographs, and the nearer one counts.
+/// eight on the other, where both photographs cover all sixteen. It is averaged over the places of a line within a
+/// square of 32 pixels: what the eye takes for a seam has one sign along it, while contours that are a little out of
+/// place change theirs. The panorama's is then compared with that of both photographs, and the nearer one counts.
 ///
-/// The lines along which a panorama with seams changes photographs are few; a feathered one changes them everywhere in an overlap
-/// by a little. `overlap_step` is therefore measured at the same places for any panorama: across all lines parallel to that
-/// along which two photographs' borders are equally far, one in eight pixels, of all photographs that cover a place the nearest
-/// counting.
+/// The lines along which a panorama with seams changes photographs are few; a feathered one changes them everywhere in
+/// an overlap by a little. `overlap_step` is therefore measured at the same places for any panorama: across all lines
+/// parallel to that along which two photographs' borders are equally far, one in eight pixels, of all photographs that
+/// cover a place the nearest counting.
 ///
-/// With `around` the canvas is a cylinder, whose first column lies beside its last. The step between these two is measured
-/// all along them, whoever is shown there. Most of such a line lies within one photograph, which a seam never does; the same is
-/// therefore measured across other columns, one in 32, for comparison.
+/// With `around` the canvas is a cylinder, whose first column lies beside its last. The step between these two is
+/// measured all along them, whoever is shown there. Most of such a line lies within one photograph, which a seam never
+/// does; the same is therefore measured across other columns, one in 32, for comparison.
 ///
 /// # Errors
 /// [`Error::Input`] if the sizes do not fit.
@@ -90,12 +91,12 @@ pub fn measure(panorama: &dyn RowSource, layers: &[Layer], shown: &[u16], around
     })
 }
 
-/// The position of the photograph whose border is farthest, for every canvas pixel: what a feathered panorama shows most.
-/// `u16::MAX` where nothing is.
+/// The position of the photograph whose border is farthest, for every canvas pixel: what a feathered panorama shows
+/// most. `u16::MAX` where nothing is.
 ///
 /// # Errors
-/// [`Error::Input`] if a layer lies outside the canvas of `size` pixels (width, height), a cylinder if `around`, or there
-/// are too many.
+/// [`Error::Input`] if a layer lies outside the canvas of `size` pixels (width, height), a cylinder if `around`, or
+/// there are too many.
 pub fn deepest(layers: &[Layer], [width, height]: [usize; 2], around: bool) -> Result<Vec<u16>> {
     let all_fit = layers.iter().all(|layer| fits(layer, [width, height], around));
     if layers.len() >= usize::from(u16::MAX) || !all_fit {

@@ -23,7 +23,8 @@ impl Steps {
     }
 }
 
-/// Steps across the lines where the photograph shown changes, where a full turn's ends meet, and across some of its columns.
+/// Steps across the lines where the photograph shown changes, where a full turn's ends meet, and across some of its
+/// columns.
 pub(super) struct LineSteps {
     pub(super) seams: Steps,
     pub(super) wrap: Steps,
@@ -33,7 +34,8 @@ pub(super) struct LineSteps {
 /// Where a stretch of a line lies, whether it runs down, and between whom; `None` stands for all who cover it.
 type Stretch = (usize, usize, bool, Option<[u16; 2]>);
 
-/// For each stretch and each photograph that may be shown there, sums of the panorama's steps and its own, and their number.
+/// For each stretch and each photograph that may be shown there, sums of the panorama's steps and its own, and their
+/// number.
 #[derive(Default)]
 struct Stretches(BTreeMap<Stretch, BTreeMap<u16, [f64; 3]>>);
 
@@ -86,7 +88,8 @@ impl MeasuredPanorama<'_> {
         LineSteps { seams: seams.total(), wrap: wrap.total(), columns: columns.total() }
     }
 
-    /// Steps across all lines, one in [`STEP_REACH`], along which the shares of the two photographs that lie deepest are even.
+    /// Steps across all lines, one in [`STEP_REACH`], along which the shares of the two photographs that lie deepest
+    /// are even.
     pub(super) fn overlap_steps(&self) -> Steps {
         let mut stretches = Stretches::default();
         for y in 0..self.gray.height() {
@@ -101,8 +104,8 @@ impl MeasuredPanorama<'_> {
         stretches.total()
     }
 
-    /// Whether feathering goes over between photographs rather from column to column than from row to row; `None` where fewer
-    /// than two lie.
+    /// Whether feathering goes over between photographs rather from column to column than from row to row; `None` where
+    /// fewer than two lie.
     fn goes_over_across(&self, x: usize, y: usize) -> Option<bool> {
         let depth = |label: usize, x: usize, y: usize| {
             index(&self.layers[label], x, y, self.turn).map_or(0, |at| self.depths[label][at])
@@ -144,8 +147,8 @@ impl MeasuredPanorama<'_> {
         Some(pixels)
     }
 
-    /// Adds the steps at a place on a line between two photographs, both of which must cover its pixels, or without a `pair`
-    /// between all that do, two at least.
+    /// Adds the steps at a place on a line between two photographs, both of which must cover its pixels, or without a
+    /// `pair` between all that do, two at least.
     fn add(&self, stretches: &mut Stretches, place: Place, pair: Option<[u16; 2]>) {
         let Some(pixels) = self.pixels(place) else { return };
         let step_of = |value: &dyn Fn(usize, usize) -> Option<f64>| -> Option<f64> {

@@ -52,7 +52,8 @@ fn a_hard_cut_shows_the_whole_step_and_no_ghost() {
     assert!(found.step < 1e-5 && found.ghost < 1e-5, "{found:?}");
 }
 
-/// A ramp that goes on across the ends of a cylinder: whoever shows it, there is no step, and one that is there is found.
+/// A ramp that goes on across the ends of a cylinder: whoever shows it, there is no step, and one that is there is
+/// found.
 #[test]
 fn the_ends_of_a_full_turn_are_a_line_too() {
     let whole = layer(|x, _| 50.0 + x as f32);
@@ -98,8 +99,9 @@ fn a_mean_of_two_that_do_not_fit_is_a_ghost() {
     assert!(measure(&mean, &layers, &[], false).is_err());
 }
 
-/// All of the canvas is the overlap, and both photographs' borders are equally far everywhere: feathering goes over nowhere, but
-/// places are counted. Half of one photograph's slope of 2 levels a column, and none of the other's, is 8 of 16 levels over 8 columns.
+/// All of the canvas is the overlap, and both photographs' borders are equally far everywhere: feathering goes over
+/// nowhere, but places are counted. Half of one photograph's slope of 2 levels a column, and none of the other's, is 8
+/// of 16 levels over 8 columns.
 #[test]
 fn steps_all_over_the_overlap_are_those_no_photograph_shows() {
     let layers = [layer(|x, _| 2.0 * x as f32), layer(|_, _| 100.0)];

@@ -45,8 +45,8 @@ impl<'a> Exposure<'a> {
         Self { photograph, small, aligned: Some(Aligned { member_from_reference, expectation }) }
     }
 
-    /// The pixels of its small copy, of every exposure the same ones in the same order; `None` where it is not to be compared with others:
-    /// beyond its border, and where it contradicts the reference.
+    /// The pixels of its small copy, of every exposure the same ones in the same order; `None` where it is not to be
+    /// compared with others: beyond its border, and where it contradicts the reference.
     pub(super) fn compared(&self) -> impl Iterator<Item = Option<[f32; 4]>> {
         let is_exchanged = |index: usize| match &self.aligned {
             None => false,
@@ -69,7 +69,8 @@ impl<'a> Exposure<'a> {
         self.photograph.channels() >= 3
     }
 
-    /// Its colors, 0 to 255 and wholly covered, within a window of the reference, whose own colors there are `reference`.
+    /// Its colors, 0 to 255 and wholly covered, within a window of the reference, whose own colors there are
+    /// `reference`.
     pub(super) fn window(
         &self,
         columns: &Range<usize>,
@@ -99,8 +100,8 @@ impl<'a> Exposure<'a> {
     }
 }
 
-/// A row of pixels of the reference's frame `scale` as large as it is, as a photograph shows them: colors from 0 to 255 and share 1;
-/// `None` beyond its border.
+/// A row of pixels of the reference's frame `scale` as large as it is, as a photograph shows them: colors from 0 to 255
+/// and share 1; `None` beyond its border.
 fn sampled(
     photograph: &Photograph,
     member_from_reference: Option<&Homography>,
@@ -124,8 +125,8 @@ fn sampled(
             is_inside[index] = false;
             (x, y) = (0.5, 0.5);
         }
-        // One more, so that the cast, which cuts off, finds the whole number below; within the photograph, whose sides are far below the
-        // range.
+        // One more, so that the cast, which cuts off, finds the whole number below; within the photograph, whose sides
+        // are far below the range.
         let whole = |place: f64| (place + 0.5) as i32 - 1;
         (positions.column[index], positions.row[index]) = (whole(x), whole(y));
         positions.fraction_x[index] = (x - 0.5 - f64::from(positions.column[index])) as f32;

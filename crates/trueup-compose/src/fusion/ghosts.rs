@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use trueup_core::color::{ToneRelation, ToneSums};
 use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median};
 
-/// Pixels of the small copies that are compared: as many as photographs are measured on, where noise is averaged away and what is off by
-/// a part of a pixel is none.
+/// Pixels of the small copies that are compared: as many as photographs are measured on, where noise is averaged away
+/// and what is off by a part of a pixel is none.
 const COMPARED_PIXELS: f64 = 480_000.0;
 /// Beyond so many standard deviations of what pixels differ from what is expected, something else is there.
 const UNEXPECTED: f32 = 4.0;
@@ -17,8 +17,8 @@ const LEAST_DIFFERENCE: f32 = 6.0;
 const CLIPPED: f32 = 250.0;
 /// Levels up to which it tells of none.
 const CRUSHED: f32 = 5.0;
-/// Pixels of the small copies around a contradiction that are exchanged as well: a thing that moved has places where it is by chance as
-/// bright as what is behind it.
+/// Pixels of the small copies around a contradiction that are exchanged as well: a thing that moved has places where it
+/// is by chance as bright as what is behind it.
 const AROUND: usize = 4;
 /// Pixels over which an exchange fades out.
 const FADE: usize = 3;
@@ -88,8 +88,8 @@ impl Expectation {
         Some(Self { relations: relations?, width, height, scale: reference.scale, exchanged })
     }
 
-    /// The pixel of the exposure (NaN where it does not reach), exchanged as far as it contradicts `reference`, the reference's color
-    /// there.
+    /// The pixel of the exposure (NaN where it does not reach), exchanged as far as it contradicts `reference`, the
+    /// reference's color there.
     pub(super) fn without_ghost(&self, pixel: [usize; 2], own: [f32; 4], reference: [f32; 3]) -> [f32; 4] {
         let share = if own[0].is_nan() { 1.0 } else { self.share_at(pixel) };
         if share <= 0.0 {
@@ -236,7 +236,8 @@ fn consolidated(excess: &[f32], size: [usize; 2]) -> Vec<bool> {
     box_sums(&core, size, AROUND).into_iter().map(|near| near > 0.0).collect()
 }
 
-/// How much is exchanged: all where pixels contradict together and around, fading out beside them, and what the exposure does not reach.
+/// How much is exchanged: all where pixels contradict together and around, fading out beside them, and what the
+/// exposure does not reach.
 fn faded(contradicts: &[bool], other: &Small, size: [usize; 2]) -> Vec<f32> {
     let sharp: Vec<f32> = contradicts.iter().map(|&contradicts| f32::from(u8::from(contradicts))).collect();
     // A pixel is exchanged wholly where half of the box is: what contradicts lies [`AROUND`] pixels within.

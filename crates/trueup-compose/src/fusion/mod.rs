@@ -1,18 +1,20 @@
 //! One photograph of several exposures of one view.
 //!
-//! Every place shows most of the exposure that shows it best, and fades over in pyramids, so that no border is seen. An exposure is heeded only
-//! where the reference lets expect what it shows: where something moved, or the exposure does not reach, it is taken for what the
-//! reference is in its tones (`ghosts`). It then has the same place in the pyramids as if the thing had stood still, and nothing of it
-//! stands out in brightness from its surroundings, as where it is left out altogether.
+//! Every place shows most of the exposure that shows it best, and fades over in pyramids, so that no border is seen. An
+//! exposure is heeded only where the reference lets expect what it shows: where something moved, or the exposure does
+//! not reach, it is taken for what the reference is in its tones (`ghosts`). It then has the same place in the pyramids
+//! as if the thing had stood still, and nothing of it stands out in brightness from its surroundings, as where it is
+//! left out altogether.
 //!
 //! # Source
-//! Mertens, Kautz and Van Reeth, "Exposure fusion", Pacific Graphics 2007: weights by contrast, saturation and good exposure, blended in
-//! Laplacian pyramids. For the exchange of what moved by the reference in the exposure's tones: Li, Rahardja, Yao, Xie and Wu, "Movement
-//! detection for the synthesis of high dynamic range images", ICIP 2010.
+//! Mertens, Kautz and Van Reeth, "Exposure fusion", Pacific Graphics 2007: weights by contrast, saturation and good
+//! exposure, blended in Laplacian pyramids. For the exchange of what moved by the reference in the exposure's tones:
+//! Li, Rahardja, Yao, Xie and Wu, "Movement detection for the synthesis of high dynamic range images", ICIP 2010.
 //!
 //! # Departures
-//! Contrast and saturation count from a floor on, so that the noise of a gray wall does not decide. A gray photograph has no saturation to
-//! be judged by. Fine levels are fused tile by tile, which takes no memory for pyramids of whole photographs.
+//! Contrast and saturation count from a floor on, so that the noise of a gray wall does not decide. A gray photograph
+//! has no saturation to be judged by. Fine levels are fused tile by tile, which takes no memory for pyramids of whole
+//! photographs.
 
 mod exposure;
 mod ghosts;
@@ -65,8 +67,8 @@ impl StackFusion for ExposureFusion {
     }
 }
 
-/// Side of a tile in pixels, a multiple of 2^first_level: of 256 pixels, a fifth and a half again are sampled for the margins, and what a
-/// thread holds of three exposures is some 10 MB.
+/// Side of a tile in pixels, a multiple of 2^first_level: of 256 pixels, a fifth and a half again are sampled for the
+/// margins, and what a thread holds of three exposures is some 10 MB.
 const fn tile_side(first_level: u32) -> usize {
     32 << first_level
 }
@@ -74,7 +76,8 @@ const fn tile_side(first_level: u32) -> usize {
 /// Columns and rows of a part of the picture.
 type Part = (Range<usize>, Range<usize>);
 
-/// The picture of all exposures, in the frame, depth and channels of the reference; what the reference has of transparency stays.
+/// The picture of all exposures, in the frame, depth and channels of the reference; what the reference has of
+/// transparency stays.
 ///
 /// # Errors
 /// [`Error::Input`] if a member has another size or a homography that is none.

@@ -1,18 +1,20 @@
 //! The light that several exposures of one view record together.
 //!
-//! An exposure's samples tell the light times its exposure, more surely the steeper its curve is there, and not at all where it is white. At
-//! every place the light is the mean of what the exposures tell of it, each weighted by how sure it is. How the exposures stand to each
-//! other is measured where they show the same thing, which files need not say and often round. What moved, or is not reached, is told by
-//! the others; the reference is always believed, but for what is white in it and as bright in another exposure.
+//! An exposure's samples tell the light times its exposure, more surely the steeper its curve is there, and not at all
+//! where it is white. At every place the light is the mean of what the exposures tell of it, each weighted by how sure
+//! it is. How the exposures stand to each other is measured where they show the same thing, which files need not say
+//! and often round. What moved, or is not reached, is told by the others; the reference is always believed, but for
+//! what is white in it and as bright in another exposure.
 //!
 //! # Source
-//! Debevec and Malik, "Recovering high dynamic range radiance maps from photographs", SIGGRAPH 1997, equation 6; weights by the variance
-//! of each estimate: Mitsunaga and Nayar, "Radiometric self calibration", CVPR 1999, section 5, and Robertson, Borman and Stevenson,
-//! "Estimation-theoretic approach to dynamic range enhancement using multiple exposures", Journal of Electronic Imaging 12(2), 2003.
+//! Debevec and Malik, "Recovering high dynamic range radiance maps from photographs", SIGGRAPH 1997, equation 6;
+//! weights by the variance of each estimate: Mitsunaga and Nayar, "Radiometric self calibration", CVPR 1999, section 5,
+//! and Robertson, Borman and Stevenson, "Estimation-theoretic approach to dynamic range enhancement using multiple
+//! exposures", Journal of Electronic Imaging 12(2), 2003.
 //!
 //! # Departures
-//! Means are of light, not of its logarithm, whose noise in the dark is lopsided. Weights end smoothly before white, where compression
-//! moves samples, for all channels of a pixel together, so that no color is seen of it.
+//! Means are of light, not of its logarithm, whose noise in the dark is lopsided. Weights end smoothly before white,
+//! where compression moves samples, for all channels of a pixel together, so that no color is seen of it.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -32,8 +34,9 @@ use crate::transfer_curve::Linearize;
 /// Levels, of 255, between which an exposure ends to count towards white.
 const FADING: [f32; 2] = [215.0, 248.0];
 
-/// Levels, of 255, from and up to which samples tell how exposures stand to each other: darker ones are mostly noise and rounding, and
-/// among brighter ones are those that are clipped in part, by interpolation and compression, and darker than they should be.
+/// Levels, of 255, from and up to which samples tell how exposures stand to each other: darker ones are mostly noise
+/// and rounding, and among brighter ones are those that are clipped in part, by interpolation and compression, and
+/// darker than they should be.
 const COMPARED: std::ops::RangeInclusive<f32> = 20.0..=180.0;
 
 /// Fewest samples by which two exposures are compared.
@@ -134,9 +137,9 @@ impl SampleLight {
         self.steps[index.min(self.steps.len() - 1)]
     }
 
-    /// How sure it is, 0 to 1, that a pixel of an exposure that takes `factor` times the light of the reference tells what is white there,
-    /// and not of something else: in all channels that are next to white in the reference it then is as bright. What the reference's other
-    /// channels say there is little, as white moves them in compressed files.
+    /// How sure it is, 0 to 1, that a pixel of an exposure that takes `factor` times the light of the reference tells
+    /// what is white there, and not of something else: in all channels that are next to white in the reference it then
+    /// is as bright. What the reference's other channels say there is little, as white moves them in compressed files.
     fn continues(&self, reference: &[f32; 4], own: &[f32; 4], factor: f32) -> f32 {
         /// Parts of the light that white is in the reference, from which on it may be that light, and is.
         const AS_BRIGHT: [f32; 2] = [0.5, 0.8];
@@ -254,8 +257,9 @@ struct Ratio {
 }
 
 impl Ratio {
-    /// The second over the first: the weighted median over all that both show. Which places are dark enough to be left out is judged by the
-    /// brighter exposure, whose noise there is little: judged by its own, those where the darker one is brighter by noise would stay.
+    /// The second over the first: the weighted median over all that both show. Which places are dark enough to be left
+    /// out is judged by the brighter exposure, whose noise there is little: judged by its own, those where the darker
+    /// one is brighter by noise would stay.
     fn between(first: &Exposure, second: &Exposure, table: &SampleLight) -> Option<Self> {
         let both: Vec<[f32; 2]> = first
             .compared()

@@ -65,8 +65,8 @@ fn what_one_exposure_loses_another_one_shows() {
     assert!(after.0 >= before.0 && after.1 > 1.5 * before.1, "{before:?} {after:?}");
 }
 
-/// A thing that only another exposure shows is nowhere in the fused picture, nor is its border; one of the reference is there, and nothing
-/// of what the others show in its place.
+/// A thing that only another exposure shows is nowhere in the fused picture, nor is its border; one of the reference is
+/// there, and nothing of what the others show in its place.
 #[test]
 fn what_moved_is_where_the_reference_has_it() {
     let others = |dark, bright| [member(taken(0.12, dark)), member(taken(8.0, bright))];

@@ -12,7 +12,8 @@ const BEST_LEVEL: f32 = 0.5;
 const LEVEL_DEVIATION: f32 = 0.2;
 /// Contrast, of 0 to 1, that a place has anyway: about what noise and compression make of an even one.
 const CONTRAST_FLOOR: f32 = 0.01;
-/// Saturation, of 0 to 1, that a place has anyway: a fifth of a plain color's, so that gray things are judged by their exposure.
+/// Saturation, of 0 to 1, that a place has anyway: a fifth of a plain color's, so that gray things are judged by their
+/// exposure.
 const SATURATION_FLOOR: f32 = 0.1;
 /// What a place that nothing shows well counts in each exposure, so that there is always a mean.
 const LEAST: f32 = 1e-12;

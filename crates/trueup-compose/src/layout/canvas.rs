@@ -27,9 +27,9 @@ pub struct CanvasLayout {
     pub origin: [f64; 2],
     /// The photographs used, in the order given; targets are canvas pixels and may lie outside the canvas.
     pub placed: Vec<Placed>,
-    /// The canvas is a cylinder of that many columns, its width: what lies beyond one end is seen at the other. A multiple
-    /// of the largest power of two (at least 8) that it holds 32 times, so that all levels of a blend repeat exactly; with
-    /// others its ends may show a faint step.
+    /// The canvas is a cylinder of that many columns, its width: what lies beyond one end is seen at the other. A
+    /// multiple of the largest power of two (at least 8) that it holds 32 times, so that all levels of a blend repeat
+    /// exactly; with others its ends may show a faint step.
     #[serde(default)]
     pub period: Option<usize>,
 }

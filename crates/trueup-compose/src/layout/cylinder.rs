@@ -5,15 +5,17 @@ use std::ops::Range;
 
 use super::canvas::{CanvasLayout, Placed};
 
-/// Samples that a turn has at least at the coarsest level that repeats exactly. Twice as many would change the scale by half
-/// as much, at most a 128th instead of a 64th, and leave too narrow transitions where few photographs make up a turn.
+/// Samples that a turn has at least at the coarsest level that repeats exactly. Twice as many would change the scale by
+/// half as much, at most a 128th instead of a 64th, and leave too narrow transitions where few photographs make up a
+/// turn.
 const LEAST_SAMPLES: usize = 32;
 
 /// Columns of the finest samples that are blended as a whole: a turn has a whole number at least of these.
 const LEAST_UNIT: usize = 8;
 
-/// A cylinder about so wide has a whole number of times so many columns, a power of two. All levels of a blend whose samples
-/// are no wider repeat exactly from turn to turn. On one of a few pixels it is a single column: nothing is blended there.
+/// A cylinder about so wide has a whole number of times so many columns, a power of two. All levels of a blend whose
+/// samples are no wider repeat exactly from turn to turn. On one of a few pixels it is a single column: nothing is
+/// blended there.
 pub(crate) fn unit_of_turn(width: usize) -> usize {
     let unit = 1 << (width / LEAST_SAMPLES).max(1).ilog2();
     if width < LEAST_SAMPLES { 1 } else { unit.max(LEAST_UNIT) }
@@ -47,8 +49,9 @@ impl CanvasLayout {
     }
 }
 
-/// The columns of a photograph of [`Placed::in_first_turn`], beginning in the first turn and not longer than one. One that
-/// goes all the way round is to be turned to the right by the second number of columns, after which it begins at 0.
+/// The columns of a photograph of [`Placed::in_first_turn`], beginning in the first turn and not longer than one. One
+/// that goes all the way round is to be turned to the right by the second number of columns, after which it begins
+/// at 0.
 pub(crate) fn columns_around(columns: Range<usize>, period: Option<usize>) -> (Range<usize>, usize) {
     let Some(period) = period else { return (columns, 0) };
     let start = columns.start % period;
@@ -65,8 +68,8 @@ impl Placed {
         moved
     }
 
-    /// The photograph moved by whole turns, so that it begins in the first turn or soon after and no column before it is
-    /// wanted for its border; without a period where it is.
+    /// The photograph moved by whole turns, so that it begins in the first turn or soon after and no column before it
+    /// is wanted for its border; without a period where it is.
     pub(crate) fn in_first_turn(&self, period: Option<usize>) -> Cow<'_, Self> {
         let Some(period) = period else { return Cow::Borrowed(self) };
         // As a share of the period: pixels of any smaller canvas that the border cuts.

@@ -30,8 +30,8 @@ const STAGE: &str = CanvasOptions::STAGE;
 /// keeps its pixel scale times [`CanvasOptions::scale`].
 ///
 /// Targets may be in any unit common to all grids. The canvas is `ceil(max - min)` of the scaled vertices; above
-/// [`CanvasOptions::max_pixels`] and [`CanvasOptions::max_growth`] all vertices are reduced evenly and `canvas-reduced` is
-/// reported.
+/// [`CanvasOptions::max_pixels`] and [`CanvasOptions::max_growth`] all vertices are reduced evenly and `canvas-reduced`
+/// is reported.
 ///
 /// # Errors
 /// [`Error::Options`]; [`Error::Input`] if there is no grid, `reference` is not one of them, or a grid's size and
@@ -48,9 +48,9 @@ pub fn run(
     run_around(placed, reference, None, options, context)
 }
 
-/// As [`run`]; with a `period`, on a cylinder: places that far apart in x, in the unit of the targets, are the same. The
-/// canvas then is the one period around the middle of the grids; its scale is the nearest to that asked for, by at most
-/// a 64th or 4 pixels, at which the period is a whole number of the samples that blending takes, see
+/// As [`run`]; with a `period`, on a cylinder: places that far apart in x, in the unit of the targets, are the same.
+/// The canvas then is the one period around the middle of the grids; its scale is the nearest to that asked for, by at
+/// most a 64th or 4 pixels, at which the period is a whole number of the samples that blending takes, see
 /// [`CanvasLayout::period`].
 ///
 /// # Errors
@@ -90,15 +90,16 @@ pub struct Frame {
     pub canvas_from_target: f64,
     /// Smallest and largest target that may be shown; `None`: all that the grids cover.
     pub window: Option<[Vector2<f64>; 2]>,
-    /// Places that far apart in x are the same: the canvas is a cylinder of that many units, from the window's left end.
+    /// Places that far apart in x are the same: the canvas is a cylinder of that many units, from the window's left
+    /// end.
     pub period: Option<f64>,
-    /// Share of the window's height, 0 to 1, from which on, if the grids reach over it, all of the window becomes the canvas; `None`:
-    /// never more than they reach over.
+    /// Share of the window's height, 0 to 1, from which on, if the grids reach over it, all of the window becomes the
+    /// canvas; `None`: never more than they reach over.
     pub whole_from: Option<f64>,
 }
 
-/// Lays the grids on one canvas as `frame` wants it: of the window the part that the grids cover. Grids that show nothing in
-/// it are left out.
+/// Lays the grids on one canvas as `frame` wants it: of the window the part that the grids cover. Grids that show
+/// nothing in it are left out.
 ///
 /// # Errors
 /// Those of [`run_around`]; [`Error::Unsolvable`] if no grid shows anything in the window.

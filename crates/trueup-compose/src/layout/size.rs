@@ -33,8 +33,8 @@ pub(super) fn most_pixels(placed: &[Placed], options: &CanvasOptions) -> f64 {
     options.max_pixels.min(grown.max(ANY_GROWTH_PIXELS))
 }
 
-/// Width and height of the canvas in whole pixels, at least 1 each. Around a cylinder the width is the nearest multiple of its
-/// unit to its `period`, and the height follows from the scale which that makes.
+/// Width and height of the canvas in whole pixels, at least 1 each. Around a cylinder the width is the nearest multiple
+/// of its unit to its `period`, and the height follows from the scale which that makes.
 pub(super) fn canvas_size(extent: Vector2<f64>, scale: f64, period: Option<f64>) -> [f64; 2] {
     // A photograph of 100 px placed at a fractional offset spans 100 px plus rounding; that is no 101st column.
     const ROUNDING_PX: f64 = 1e-6;

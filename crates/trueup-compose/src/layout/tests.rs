@@ -68,8 +68,8 @@ fn a_cylinder_is_its_period_in_whole_pixels_around_the_middle() {
     assert_eq!(flat.unrolled(100), (Cow::Borrowed(&flat), vec![0, 1]));
 }
 
-/// Whatever the scale: the width is a whole number of times a power of two that it holds 32 times, no more than a 64th from
-/// what was asked for; the height is that of the scale which was used.
+/// Whatever the scale: the width is a whole number of times a power of two that it holds 32 times, no more than a 64th
+/// from what was asked for; the height is that of the scale which was used.
 #[test]
 fn a_turn_is_a_whole_number_of_the_samples_of_a_blend() {
     let context = StageContext::default();

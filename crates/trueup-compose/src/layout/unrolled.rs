@@ -8,8 +8,8 @@ use trueup_core::{Error, Result};
 use super::canvas::{CanvasLayout, Placed};
 use crate::label::NOBODY;
 
-/// A layout without a period, on which the photographs of one with a period lie wherever they are seen. The turn between
-/// [`Self::lead`] and `lead + width` is the panorama. Without a period the layout is as it was.
+/// A layout without a period, on which the photographs of one with a period lie wherever they are seen. The turn
+/// between [`Self::lead`] and `lead + width` is the panorama. Without a period the layout is as it was.
 pub(crate) struct Unrolled<'a> {
     original: &'a CanvasLayout,
     layout: Cow<'a, CanvasLayout>,

@@ -15,8 +15,8 @@ use crate::look::local_exposure;
 use crate::render_options::Look;
 use crate::transfer_curve::Encoding;
 
-/// The same photographs with the corrected curve in place of their color profile's: all that reads samples or writes the
-/// panorama takes it from here, so that what is shown as it was taken keeps its samples.
+/// The same photographs with the corrected curve in place of their color profile's: all that reads samples or writes
+/// the panorama takes it from here, so that what is shown as it was taken keeps its samples.
 pub(crate) struct ByResponse<'a> {
     photographs: &'a dyn PhotographSource,
     curve: TransferCurve,

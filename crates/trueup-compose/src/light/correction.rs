@@ -18,8 +18,8 @@ pub struct Correction {
     /// Coefficients of r^2, r^4 and r^6 in the natural logarithm of a further factor on all channels; r is the distance
     /// from the photograph's middle, 1 in its corners.
     pub vignetting: [f64; VIGNETTING_TERMS],
-    /// How far the camera levels highlights off towards white, beside the response: 0 where it clips hard, 1 where darkening undoes all
-    /// that brightening does.
+    /// How far the camera levels highlights off towards white, beside the response: 0 where it clips hard, 1 where
+    /// darkening undoes all that brightening does.
     #[serde(default = "whole_shoulder")]
     pub shoulder: f64,
 }
@@ -87,8 +87,8 @@ impl Correction {
 /// What evens out the light of all photographs of a panorama.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Corrections {
-    /// The cameras' response, by which samples are read and the panorama is written: what is shown as it was taken keeps
-    /// its samples. All factors act on the light by this response.
+    /// The cameras' response, by which samples are read and the panorama is written: what is shown as it was taken
+    /// keeps its samples. All factors act on the light by this response.
     pub response: Response,
     /// One for each photograph.
     pub photographs: Vec<Correction>,
@@ -106,8 +106,8 @@ impl Corrections {
         self
     }
 
-    /// Those of what is placed in `layout`, if `index_of` tells a photograph's place in these. A photograph may be placed
-    /// several times, or not at all; its light is the same everywhere.
+    /// Those of what is placed in `layout`, if `index_of` tells a photograph's place in these. A photograph may be
+    /// placed several times, or not at all; its light is the same everywhere.
     pub fn of_placed(&self, layout: &CanvasLayout, index_of: impl Fn(usize) -> Option<usize>) -> Self {
         let of = |placed: &Placed| self.photographs.get(index_of(placed.photograph)?).copied();
         Self { response: self.response, photographs: layout.placed.iter().filter_map(of).collect() }

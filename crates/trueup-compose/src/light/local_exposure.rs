@@ -21,8 +21,8 @@ pub(crate) struct ExposureMap {
 }
 
 impl ExposureMap {
-    /// The two cells between whose middles places of `first..first + 1` lie along an axis, counted in cells from the first
-    /// one's middle; beyond the outer ones they hold on, or go round.
+    /// The two cells between whose middles places of `first..first + 1` lie along an axis, counted in cells from the
+    /// first one's middle; beyond the outer ones they hold on, or go round.
     fn cells_beside(&self, axis: usize, first: f64) -> [usize; 2] {
         let count = self.cells[axis];
         // The casts saturate.
@@ -88,7 +88,8 @@ impl LocalExposure {
             let [left, right] = map.cells_beside(0, first).map(|at| upper[at] + below * (lower[at] - upper[at]));
             let filled = out.len();
             out.resize(filled + end - x, 0.0);
-            // Where the first one's middle lies, in pixels: the same for all stretches between the two, wherever they begin.
+            // Where the first one's middle lies, in pixels: the same for all stretches between the two, wherever they
+            // begin.
             let middle = ((first + 0.5) * map.cell_px[0] + map.corner[0] - self.shift[0]) / self.scale[0] - 0.5;
             let whole = middle.floor();
             with_vector_instructions(Straight {
@@ -151,7 +152,8 @@ mod tests {
     #[test]
     fn between_cells_it_is_bilinear_and_beyond_them_it_holds_on() {
         let local = LocalExposure::from(map(false));
-        // The pixel's middle is 110.5, 0.55 of the way between the first two cells' middles, 105 and 115; both rows lie below 10.
+        // The pixel's middle is 110.5, 0.55 of the way between the first two cells' middles, 105 and 115; both rows lie
+        // below 10.
         assert!((factor(&local, 110, 3) - 1.55).abs() < 1e-6);
         // Row 19: middle 19.5, 0.475 of the way from 10 to 30.
         assert!((factor(&local, 110, 19) - (1.55 + 0.475 * (3.55 - 1.55))).abs() < 1e-6);

@@ -7,9 +7,9 @@ use trueup_core::{Error, Result};
 /// Functions that the correction of the response is made of.
 pub const RESPONSE_TERMS: usize = 4;
 
-/// The response of the photographs' cameras, one for all, as a correction of the color profile's curve: a sample that is
-/// encoded as e and stands for the light l by the profile came from the light `l exp(c . f(e))`, but for a factor that is
-/// the same for all levels.
+/// The response of the photographs' cameras, one for all, as a correction of the color profile's curve: a sample that
+/// is encoded as e and stands for the light l by the profile came from the light `l exp(c . f(e))`, but for a factor
+/// that is the same for all levels.
 ///
 /// White stays white, since all f vanish there. Cameras do not write the light itself: they lift the middle and press
 /// the highlights together, so that the same factor of exposure moves middle and highlights differently.
@@ -20,8 +20,8 @@ pub struct Response {
     pub coefficients: [f64; RESPONSE_TERMS],
 }
 
-/// Least slope of the logarithm of the light against that of the profile's light: no response is taken to press more than
-/// this many stops into one.
+/// Least slope of the logarithm of the light against that of the profile's light: no response is taken to press more
+/// than this many stops into one.
 const LEAST_SLOPE: f64 = 0.25;
 
 /// Encoded value, seven 8-bit levels, below which the function beside a power goes straight down to black.
@@ -34,8 +34,9 @@ const CHECKED: usize = 1020;
 const STEPS: usize = 65_535;
 
 impl Response {
-    /// The functions f at the encoded value `e`: ln((e + d) / (1 + d)) / ln((1 + d) / d) with d = 0.03, near to a power of the
-    /// light, and 4 e (1 - e) times the Chebyshev polynomials T_0 to T_2 of 1 - 2 e. All are 0 at white and from -1 to 1.
+    /// The functions f at the encoded value `e`: ln((e + d) / (1 + d)) / ln((1 + d) / d) with d = 0.03, near to a power
+    /// of the light, and 4 e (1 - e) times the Chebyshev polynomials T_0 to T_2 of 1 - 2 e. All are 0 at white and from
+    /// -1 to 1.
     pub fn terms(e: f64) -> [f64; RESPONSE_TERMS] {
         let (bump, u) = (4.0 * e * (1.0 - e), 1.0 - 2.0 * e);
         let power = ((e + FOOT) / (1.0 + FOOT)).ln() / ((1.0 + FOOT) / FOOT).ln();
@@ -57,8 +58,8 @@ impl Response {
         profile.linear(e) * self.log_factor(e).exp()
     }
 
-    /// The nearest response in its direction that rises: weakened until a stop of the profile's light is at least a quarter
-    /// of a stop everywhere.
+    /// The nearest response in its direction that rises: weakened until a stop of the profile's light is at least a
+    /// quarter of a stop everywhere.
     pub(crate) fn rising(self, profile: &TransferCurve) -> Self {
         let mut share = 1.0_f64;
         let place = |step: usize| step as f64 / CHECKED as f64;
@@ -110,7 +111,8 @@ mod tests {
 
     #[test]
     fn the_factor_follows_the_formula() {
-        // At e = 1/4: 4 e (1 - e) = 3/4, u = 1/2, 2 u^2 - 1 = -1/2; ln(0.28 / 1.03) / ln(1.03 / 0.03) = -1.302525 / 3.536117.
+        // At e = 1/4: 4 e (1 - e) = 3/4, u = 1/2, 2 u^2 - 1 = -1/2; ln(0.28 / 1.03) / ln(1.03 / 0.03) = -1.302525 /
+        // 3.536117.
         let [power, others @ ..] = Response::terms(0.25);
         assert_eq!(others, [0.75, 0.375, -0.375]);
         assert!((power + 0.368_349).abs() < 1e-6, "{power}");

@@ -9,30 +9,30 @@ use super::local_exposure::LocalExposure;
 use crate::linear_table::LinearTable;
 use crate::transfer_curve::Linearize;
 
-/// Smallest factor at which what is clipped in all channels stays white: highlights are lifted by its inverse at most, since what
-/// lies between the levels next to white is mostly noise.
+/// Smallest factor at which what is clipped in all channels stays white: highlights are lifted by its inverse at most,
+/// since what lies between the levels next to white is mostly noise.
 pub(crate) const LEAST_WHITE: f32 = 0.6;
 
-/// Linear light above which a channel counts as clipped the more the nearer it is to white: level 237 of sRGB. Noise and
-/// compression carry what is clipped this far down. Of 0.8 to 0.95, the lower leave fewer false hues (4.1 to 7.2 % of what is clipped
-/// in one or two channels, five panoramas).
+/// Linear light above which a channel counts as clipped the more the nearer it is to white: level 237 of sRGB. Noise
+/// and compression carry what is clipped this far down. Of 0.8 to 0.95, the lower leave fewer false hues (4.1 to 7.2 %
+/// of what is clipped in one or two channels, five panoramas).
 pub(crate) const NEAR_WHITE: f32 = 0.85;
 
-/// Mean linear light of the channels between which what a camera without a shoulder took becomes white: levels 231 and 251 of sRGB, so that noise
-/// beside white is none in what is darkened.
+/// Mean linear light of the channels between which what a camera without a shoulder took becomes white: levels 231 and
+/// 251 of sRGB, so that noise beside white is none in what is darkened.
 pub(crate) const WHITENED: [f32; 2] = [0.8, 0.97];
 
 /// Darkest light by which another channel is divided: level 3 of sRGB.
 pub(crate) const LEAST_DIVISOR: f32 = 1e-3;
 
-/// How far green may lie above blue, as a factor, for what is clipped in red to be yet redder: beyond that it may be a yellow thing as well,
-/// which should not turn orange.
+/// How far green may lie above blue, as a factor, for what is clipped in red to be yet redder: beyond that it may be a
+/// yellow thing as well, which should not turn orange.
 pub(crate) const WARMEST: f32 = 1.5;
 
 /// Linear light times a factor f; above 1 `f x / (1 + (f^4 - 1) x^4)^(1/4)`.
 ///
-/// That levels off towards white: it rises from 0 to 1, so that what the camera did not clip is not clipped here, and is within 1 % of
-/// `f x` up to x = 0.22 for f = 2.
+/// That levels off towards white: it rises from 0 to 1, so that what the camera did not clip is not clipped here, and
+/// is within 1 % of `f x` up to x = 0.22 for f = 2.
 #[inline(always)]
 pub(crate) fn exposed(linear: f32, factor: f32) -> f32 {
     let square = |value: f32| value * value;
@@ -42,15 +42,17 @@ pub(crate) fn exposed(linear: f32, factor: f32) -> f32 {
 
 /// Linear light of red, green and blue times a factor f for each: [`exposed`] where that brightens.
 ///
-/// Cameras level highlights off when they expose longer, as far as they have a `shoulder` (0 to 1): darkening spreads them by
-/// `1 / (1 + (f^4 - 1) x^4)^(1/4)`, channel by channel. What one without took keeps its proportions up to the light at which the camera
-/// clips, where all three channels together become white. Between them the factors lie so, too. With either, what is clipped in all of them stays white instead of turning gray.
+/// Cameras level highlights off when they expose longer, as far as they have a `shoulder` (0 to 1): darkening spreads
+/// them by `1 / (1 + (f^4 - 1) x^4)^(1/4)`, channel by channel. What one without took keeps its proportions up to the
+/// light at which the camera clips, where all three channels together become white. Between them the factors lie so,
+/// too. With either, what is clipped in all of them stays white instead of turning gray.
 ///
-/// Of what is clipped in one or two channels the hue is lost: blue skies turn cyan, and wood yellow. Skies, shade, skin and wood are colored
-/// along the spectrum: where green is above red, blue is above green, and where it is above blue, red is. What is near white
-/// in blue, or in red, is therefore made brighter as if it were above green by half of the stops by which green is
-/// above the third. (Of 0.25 to 1 the middle; in what five panoramas show bright and not clipped, the median is 0.15 to 0.95.) Green near white is spread to the middle
-/// between red and blue at most, in stops, or to red where blue is darker.
+/// Of what is clipped in one or two channels the hue is lost: blue skies turn cyan, and wood yellow. Skies, shade, skin
+/// and wood are colored along the spectrum: where green is above red, blue is above green, and where it is above blue,
+/// red is. What is near white in blue, or in red, is therefore made brighter as if it were above green by half of the
+/// stops by which green is above the third. (Of 0.25 to 1 the middle; in what five panoramas show bright and not
+/// clipped, the median is 0.15 to 0.95.) Green near white is spread to the middle between red and blue at most, in
+/// stops, or to red where blue is darker.
 #[inline(always)]
 pub(crate) fn shown([red, green, blue]: [f32; 3], factors: [f32; 3], shoulder: f32) -> [f32; 3] {
     let square = |value: f32| value * value;
@@ -96,7 +98,8 @@ pub(crate) struct PhotographLight<'a> {
     pub(crate) local: Option<&'a LocalExposure>,
 }
 
-/// From a photograph's samples to corrected light, as the inner loops read it: its transfer curve and its [`Correction`].
+/// From a photograph's samples to corrected light, as the inner loops read it: its transfer curve and its
+/// [`Correction`].
 #[derive(Debug, Clone)]
 pub(crate) struct LightTable {
     pub(crate) linearize: Arc<Linearize>,
@@ -147,8 +150,8 @@ impl LightTable {
         self.falloff.is_some()
     }
 
-    /// The factors against vignetting by the squared distance from a center, pixels: the table, that center, table steps per squared pixel,
-    /// and the last step; `None` where there is none.
+    /// The factors against vignetting by the squared distance from a center, pixels: the table, that center, table
+    /// steps per squared pixel, and the last step; `None` where there is none.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     pub(crate) fn falloff(&self) -> Option<(&LinearTable<ENTRIES>, [f32; 2], f32, f32)> {
@@ -224,7 +227,8 @@ mod tests {
         assert!(light.iter().all(|channel| *channel > 0.97), "{light:?}");
     }
 
-    /// Without a shoulder, what is not clipped keeps its proportions however it is darkened; with one, what is brighter gains.
+    /// Without a shoulder, what is not clipped keeps its proportions however it is darkened; with one, what is brighter
+    /// gains.
     #[test]
     fn a_camera_that_clips_hard_has_no_highlights_to_spread() {
         for factor in [0.3, 0.6, 0.9] {
@@ -239,8 +243,8 @@ mod tests {
         assert!(red / green > 1.25 && green / blue > 1.18, "{red} {green} {blue}");
     }
 
-    /// A sky that is clipped in blue, or in blue and green, is shown blue, not cyan; a wall clipped in red no pinker than it is, and a
-    /// yellow leaf not orange.
+    /// A sky that is clipped in blue, or in blue and green, is shown blue, not cyan; a wall clipped in red no pinker
+    /// than it is, and a yellow leaf not orange.
     #[test]
     fn what_is_clipped_in_some_channels_keeps_a_hue() {
         for shoulder in [0.0, 0.5, 1.0] {

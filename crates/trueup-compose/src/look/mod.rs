@@ -1,9 +1,10 @@
 //! What is done with differences of exposure beyond those that a picture can bear.
 //!
-//! Corrections make the light of all photographs one: beside photographs of sunlight, what was exposed for the shade comes
-//! out as dark as it is, and a room behind a sunlit door is black. Here every photograph gets back a part of its own
-//! exposure, and this goes over into what its neighbors get as widely and smoothly as they overlap. Each place of the
-//! canvas has one factor for all photographs: they fit together as before, contours and all, and no contour has a halo.
+//! Corrections make the light of all photographs one: beside photographs of sunlight, what was exposed for the shade
+//! comes out as dark as it is, and a room behind a sunlit door is black. Here every photograph gets back a part of its
+//! own exposure, and this goes over into what its neighbors get as widely and smoothly as they overlap. Each place of
+//! the canvas has one factor for all photographs: they fit together as before, contours and all, and no contour has a
+//! halo.
 
 use trueup_core::StageContext;
 use trueup_core::diagnostics::{Diagnostic, Subject};
@@ -53,8 +54,8 @@ impl Bearing {
     }
 }
 
-/// The factors that a look lays over the canvas, for photographs with these corrections (one for each placed); `None` if
-/// all are 1.
+/// The factors that a look lays over the canvas, for photographs with these corrections (one for each placed); `None`
+/// if all are 1.
 ///
 /// They depend on where the photographs lie, not on what is kept of the canvas.
 ///
@@ -64,8 +65,8 @@ impl Bearing {
 /// adjustment of tonal values", SIGGRAPH 2006.
 ///
 /// # Departures
-/// The field there follows contours of the picture, with strokes by hand; here it is smooth, and what it changes is told
-/// by the photographs' exposures.
+/// The field there follows contours of the picture, with strokes by hand; here it is smooth, and what it changes is
+/// told by the photographs' exposures.
 pub(crate) fn local_exposure(layout: &CanvasLayout, corrections: &[Correction], look: Look) -> Option<LocalExposure> {
     let bearing = look.bearing()?;
     let given_back = |correction: &Correction| {
@@ -104,8 +105,8 @@ const CELLS_PER_SIDE: f64 = 48.0;
 /// Most cells of a field, 190 MB while it is made. A thousand photographs have fewer.
 const MOST_CELLS: f64 = 2e6;
 
-/// Standard deviation of the smoothing as a share of the photographs' shorter side: where overlaps are narrow, the change
-/// takes about half of a photograph.
+/// Standard deviation of the smoothing as a share of the photographs' shorter side: where overlaps are narrow, the
+/// change takes about half of a photograph.
 const SMOOTHING: f64 = 0.15;
 
 /// Exponent of the weight of a photograph towards its border: the change takes the whole overlap.
@@ -198,7 +199,8 @@ fn bell(deviation: f64) -> Vec<f64> {
     (0..=reach).map(|step| (-0.5 * (step as f64 / deviation.max(f64::MIN_POSITIVE)).powi(2)).exp()).collect()
 }
 
-/// Every row convolved with a symmetric kernel of which half is given; `at` tells which cell lies some steps from another.
+/// Every row convolved with a symmetric kernel of which half is given; `at` tells which cell lies some steps from
+/// another.
 fn convolved(
     cells: &[[f64; 2]],
     [across, _]: [usize; 2],

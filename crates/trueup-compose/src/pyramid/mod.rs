@@ -1,7 +1,7 @@
 //! Levels of pyramids whose photographs do not cover every sample.
 //!
-//! Sample i of level l sits on pixel 2^l i of the canvas, whatever part of the canvas a plane holds: two planes that both
-//! hold what a sample is made of give it the same bits.
+//! Sample i of level l sits on pixel 2^l i of the canvas, whatever part of the canvas a plane holds: two planes that
+//! both hold what a sample is made of give it the same bits.
 //!
 //! # Source
 //! Burt, Adelson, "A multiresolution spline with application to image mosaics", ACM TOG 2(4), 1983; kernel 1 4 6 4 1.

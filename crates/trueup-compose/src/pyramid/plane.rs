@@ -235,8 +235,8 @@ impl<T: Texel> VectorLoop for ExpandedRow<'_, '_, T> {
 }
 
 impl PyramidPlane<[f32; 4]> {
-    /// The color at a place, in samples, between the four around it that the plane holds and that something covers; `None` without
-    /// any.
+    /// The color at a place, in samples, between the four around it that the plane holds and that something covers;
+    /// `None` without any.
     pub(crate) fn color_at(&self, [x, y]: [f64; 2]) -> Option<[f32; 3]> {
         let (left, top) = (x.floor(), y.floor());
         let (u, v) = ((x - left) as f32, (y - top) as f32);

@@ -11,8 +11,9 @@ fn mean([r, g, b, weight]: [f32; 4]) -> Option<[f32; 3]> {
     (weight > 0.0).then(|| [r / weight, g / weight, b / weight])
 }
 
-/// Adds to `sum` the level's detail of one photograph, `level` minus its interpolated coarser level, weighted by `mask` and by
-/// the share covered (its fourth power); masks count as `least` more than they are. The coarser level has even shares ([`level_shares`]), as what is added back has.
+/// Adds to `sum` the level's detail of one photograph, `level` minus its interpolated coarser level, weighted by `mask`
+/// and by the share covered (its fourth power); masks count as `least` more than they are. The coarser level has even
+/// shares ([`level_shares`]), as what is added back has.
 pub(crate) fn add_detail(
     sum: &mut PyramidPlane<[f32; 4]>,
     level: &PyramidPlane<[f32; 4]>,
@@ -80,7 +81,8 @@ impl VectorLoop for Weighted<'_> {
             if mask > 0.0
                 && let Some([r, g, b]) = color(*own)
             {
-                // Where a photograph ends, its samples are means of one side only: they soon count nothing beside others.
+                // Where a photograph ends, its samples are means of one side only: they soon count nothing beside
+                // others.
                 let share = own[3].max(LEAST_TRUST);
                 let weight = mask * (share * share) * (share * share);
                 let detail = match smooth.map(|smooth| color(smooth[x])) {
@@ -94,8 +96,8 @@ impl VectorLoop for Weighted<'_> {
     }
 }
 
-/// Turns weighted sums into the blended level: their mean, on top of what the coarser blended level interpolates to. The
-/// fourth channel becomes 1 where there is something.
+/// Turns weighted sums into the blended level: their mean, on top of what the coarser blended level interpolates to.
+/// The fourth channel becomes 1 where there is something.
 pub(crate) fn collapse(sum: &mut PyramidPlane<[f32; 4]>, coarser: Option<&PyramidPlane<[f32; 4]>>) {
     let (columns, rows) = (sum.columns.clone(), sum.rows.clone());
     let mut expansion = coarser.map(|coarser| coarser.expansion(&columns, rows.start));

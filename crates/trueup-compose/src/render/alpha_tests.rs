@@ -25,7 +25,8 @@ fn side_by_side(left: usize) -> CanvasLayout {
     canvas(left + SIDE, SIDE, placed.into())
 }
 
-/// A wedge is transparent in both photographs, from 60 rows at the left end of the canvas to none at the right one. Their grids cover it.
+/// A wedge is transparent in both photographs, from 60 rows at the left end of the canvas to none at the right one.
+/// Their grids cover it.
 #[test]
 fn what_is_transparent_is_not_covered() {
     let layout = side_by_side(150);
@@ -66,8 +67,8 @@ fn what_is_transparent_is_not_covered() {
     }
 }
 
-/// Photographs of which all is half transparent: where one is alone, so is the panorama; where two lie over each other, nothing shows through,
-/// whichever of them is seen.
+/// Photographs of which all is half transparent: where one is alone, so is the panorama; where two lie over each other,
+/// nothing shows through, whichever of them is seen.
 #[test]
 fn what_is_half_transparent_is_as_opaque_as_all_that_show_it() {
     const HALF: u8 = 128;

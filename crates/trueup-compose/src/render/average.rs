@@ -107,7 +107,8 @@ struct Summing<'a> {
 }
 
 impl Summing<'_> {
-    /// Sums over the rows `part` of the canvas, of the photographs at the positions `covering`; notes whether one of these `has_alpha`.
+    /// Sums over the rows `part` of the canvas, of the photographs at the positions `covering`; notes whether one of
+    /// these `has_alpha`.
     fn sums(
         &self,
         part: &Range<usize>,

@@ -1,10 +1,10 @@
 //! Rendering that others do a part of: other programs, or other machines.
 //!
-//! Two parts of rendering along seams take most of its time, and can be done anywhere, photograph by photograph and region by
-//! region: photographs are made small, and regions of the canvas are finished. What lies between them is decided once, from all
-//! photographs: seams, the part of the canvas that is kept, and the coarse levels of the blend. What helpers are handed and what they
-//! give can be written down; what they do, they do by [`make_small`] and [`finish_region`], the very code that renders without them,
-//! so that the panorama is the same to the last bit.
+//! Two parts of rendering along seams take most of its time, and can be done anywhere, photograph by photograph and
+//! region by region: photographs are made small, and regions of the canvas are finished. What lies between them is
+//! decided once, from all photographs: seams, the part of the canvas that is kept, and the coarse levels of the blend.
+//! What helpers are handed and what they give can be written down; what they do, they do by [`make_small`] and
+//! [`finish_region`], the very code that renders without them, so that the panorama is the same to the last bit.
 
 use trueup_core::{Result, StageContext};
 
@@ -18,11 +18,12 @@ use crate::render_options::RenderOptions;
 use crate::small_views::{self, BorderInput, SmallViewsInput, TakeSmall};
 use crate::warped::Resampling;
 
-/// Makes the photographs at these positions small, for somebody else who renders the same `input` by the same options; hands them to
-/// `take` in their order.
+/// Makes the photographs at these positions small, for somebody else who renders the same `input` by the same options;
+/// hands them to `take` in their order.
 ///
 /// # Errors
-/// [`trueup_core::Error::Input`] if `work` or a position belongs to another panorama; those of [`run`](super::run) and of `take`.
+/// [`trueup_core::Error::Input`] if `work` or a position belongs to another panorama; those of [`run`](super::run) and
+/// of `take`.
 pub fn make_small(
     input: &RenderInput<'_>,
     resources: &Resources<'_>,

@@ -69,8 +69,8 @@ fn what_is_kept_is_the_same_and_the_rest_is_left_empty() {
     }
 }
 
-/// Three photographs of different exposure beside each other, of which each lies lower than the one before: a smooth sky above rough
-/// ground. The corners in the sky may be filled, those in the ground may not.
+/// Three photographs of different exposure beside each other, of which each lies lower than the one before: a smooth
+/// sky above rough ground. The corners in the sky may be filled, those in the ground may not.
 #[test]
 fn the_frame_is_chosen_as_it_would_be_by_the_panorama() {
     let ground = noise(600, 400, 1);
@@ -95,8 +95,8 @@ fn the_frame_is_chosen_as_it_would_be_by_the_panorama() {
     let expected = framing.of_panorama(&whole.panorama, &layout).expect("in memory");
     assert_eq!(framed.frame.as_ref(), Some(&expected));
     let Frame::Part(kept) = expected else { panic!("{expected:?}") };
-    // Above row 16 two thirds of the sky would be filled, which is not worth it; the row of cells beside it, smooth all along, comes
-    // in addition.
+    // Above row 16 two thirds of the sky would be filled, which is not worth it; the row of cells beside it, smooth all
+    // along, comes in addition.
     assert_eq!(kept, Rectangle { columns: 0..1440, rows: 12..400 });
     let [framed, whole] = [framed, whole].map(|one| kept_samples(one.panorama, &layout, &options, &kept));
     assert!(framed == whole);

@@ -2,28 +2,32 @@
 
 use crate::pyramid::PyramidPlane;
 
-/// Pixels between the samples that are compared: those of photographs that were drawn larger, or compressed, are alike beside each other.
+/// Pixels between the samples that are compared: those of photographs that were drawn larger, or compressed, are alike
+/// beside each other.
 const STEP: usize = 2;
 
 /// Levels of 8 bits; a step of a root is one of encoded levels, within a third.
 const LEVELS: f32 = 255.0;
 
-/// Least deviation, square roots of light: that of numbers that are anywhere within one step of 8 bits. Less, and a slope is seen in bands.
+/// Least deviation, square roots of light: that of numbers that are anywhere within one step of 8 bits. Less, and a
+/// slope is seen in bands.
 const LEAST: f32 = 0.288_675_1 / LEVELS;
 
 /// Most deviation, square roots of light: that of a sky at a high sensitivity. What differs by more is no grain.
 const MOST: f32 = 3.0 / LEVELS;
 
-/// The grain of a picture, of which `known` is known: the absolute deviations of its samples from those around them, times the share.
+/// The grain of a picture, of which `known` is known: the absolute deviations of its samples from those around them,
+/// times the share.
 ///
 /// # Source
-/// Immerkaer, "Fast noise variance estimation", Computer Vision and Image Understanding 64(2), 1996: neither slopes nor even bends of a
-/// picture count.
+/// Immerkaer, "Fast noise variance estimation", Computer Vision and Image Understanding 64(2), 1996: neither slopes nor
+/// even bends of a picture count.
 ///
 /// # Departures
 /// Samples are [`STEP`] apart. What is not known wholly around a sample counts as little as the least known of it.
 pub(super) fn of(known: &PyramidPlane<[f32; 4]>) -> PyramidPlane<[f32; 4]> {
-    /// The operator's weights along one axis; that of a sample is their product, and its deviation [`NORM`] times that of the samples.
+    /// The operator's weights along one axis; that of a sample is their product, and its deviation [`NORM`] times that
+    /// of the samples.
     const WEIGHTS: [f32; 3] = [1.0, -2.0, 1.0];
     const NORM: f32 = 6.0;
     /// Mean absolute deviation of a normal distribution: the square root of 2 / pi.
@@ -59,8 +63,9 @@ pub(super) fn deviation(beside: [f32; 3]) -> [f32; 3] {
     beside.map(|deviation| deviation.clamp(LEAST, MOST))
 }
 
-/// A number of deviation 1 and mean 0 for a place of the canvas, the same whenever it is asked for: `columns` are that of the place and the one after it. As in
-/// photographs, whose samples lie between those of the camera, it is like those beside it.
+/// A number of deviation 1 and mean 0 for a place of the canvas, the same whenever it is asked for: `columns` are that
+/// of the place and the one after it. As in photographs, whose samples lie between those of the camera, it is like
+/// those beside it.
 pub(super) fn noise(columns: [usize; 2], row: usize) -> f32 {
     /// Deviation of the mean of four even numbers from -1/2 to 1/2, its inverse: the square root of 48.
     const NORM: f32 = 6.928_203;
@@ -71,7 +76,8 @@ pub(super) fn noise(columns: [usize; 2], row: usize) -> f32 {
 /// A number from -1/2 to 1/2 for a place, all equally likely.
 ///
 /// # Source
-/// The mixing function of splitmix64: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
+/// The mixing function of splitmix64: Steele, Lea, Flood, "Fast splittable pseudorandom number generators",
+/// OOPSLA 2014.
 fn even(column: usize, row: usize) -> f32 {
     /// Any odd number: the generator's own.
     const SEED: u64 = 0x9E37_79B9_7F4A_7C15;

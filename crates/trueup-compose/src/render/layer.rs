@@ -22,8 +22,8 @@ use crate::window::Window;
 /// Rows of a layer that are sampled at once; its cells are found once for all of them.
 const BAND_ROWS: usize = 16;
 
-/// What one photograph shows of the canvas: its bounding box there. On a cylinder it may run past the width into the next
-/// turn, but does not meet itself.
+/// What one photograph shows of the canvas: its bounding box there. On a cylinder it may run past the width into the
+/// next turn, but does not meet itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer {
     /// First column of the canvas.
@@ -36,8 +36,8 @@ pub struct Layer {
     pub covered: Raster<bool>,
 }
 
-/// Renders the photograph at `layout.placed[position]` alone, corrected, as [`super::run`] would, but that one drawn smaller is
-/// averaged anew for every pixel.
+/// Renders the photograph at `layout.placed[position]` alone, corrected, as [`super::run`] would, but that one drawn
+/// smaller is averaged anew for every pixel.
 ///
 /// # Errors
 /// Those of [`super::run`], and [`trueup_core::Error::Input`] if there is no such position.
@@ -143,8 +143,8 @@ impl std::fmt::Debug for LayerRows {
     }
 }
 
-/// Prepares photograph `layout.placed[position]` to be rendered alone, as [`super::run`] would; `None` if none of it lies on
-/// the canvas.
+/// Prepares photograph `layout.placed[position]` to be rendered alone, as [`super::run`] would; `None` if none of it
+/// lies on the canvas.
 ///
 /// # Errors
 /// Those of [`layer`].

@@ -1,8 +1,8 @@
 //! Warp, correct and compose: the full-resolution photographs onto the canvas.
 //!
 //! With seams (the default), photographs are made small, seams are found between the small views, and the canvas is
-//! finished in tiles along them; see [`Blend`]. Without, photographs are decoded as many at a time as memory and threads
-//! allow, then added to the canvas one after the other, each in parallel over bands of rows. Both give the same
+//! finished in tiles along them; see [`Blend`]. Without, photographs are decoded as many at a time as memory and
+//! threads allow, then added to the canvas one after the other, each in parallel over bands of rows. Both give the same
 //! bits for any number of threads.
 
 mod average;
@@ -58,28 +58,31 @@ pub struct Rendered {
     pub panorama: Panorama,
     /// The seams along which it was composed; `None` where photographs were averaged.
     pub seams: Option<Seams>,
-    /// What of the canvas becomes the panorama, if that was decided: nothing else need be composed. `None` if all of it was.
+    /// What of the canvas becomes the panorama, if that was decided: nothing else need be composed. `None` if all of it
+    /// was.
     pub frame: Option<Frame>,
-    /// Whether some photograph has an alpha channel: then all of the canvas was composed, no frame was chosen, and of what grids cover,
-    /// [`Panorama::opaque_part`] is covered.
+    /// Whether some photograph has an alpha channel: then all of the canvas was composed, no frame was chosen, and of
+    /// what grids cover, [`Panorama::opaque_part`] is covered.
     pub has_alpha: bool,
 }
 
 /// Renders the panorama: every photograph warped by its grid, corrected and blended.
 ///
-/// With a `framing`, what becomes of the canvas is decided as soon as the seams are known, if it can be, and what lies outside of
-/// it, and is not read to fill its gaps, is not composed: it stays empty. What is composed is the same as without. Where photographs are
-/// transparent shows when they are composed: with one that has an alpha channel, `framing` decides nothing.
+/// With a `framing`, what becomes of the canvas is decided as soon as the seams are known, if it can be, and what lies
+/// outside of it, and is not read to fill its gaps, is not composed: it stays empty. What is composed is the same as
+/// without. Where photographs are transparent shows when they are composed: with one that has an alpha channel,
+/// `framing` decides nothing.
 ///
-/// What does not fit into the memory of `resources` goes to a scratch file, and photographs are decoded again where they
-/// cannot be kept; the panorama is the same to the last bit. A canvas pixel sees the photograph at exactly one position, found by
-/// inverting the bilinear map of the cell that covers it; where a grid folds over itself, the later cell (row-major)
-/// covers. Progress counts photographs, twice where seams are sought.
+/// What does not fit into the memory of `resources` goes to a scratch file, and photographs are decoded again where
+/// they cannot be kept; the panorama is the same to the last bit. A canvas pixel sees the photograph at exactly one
+/// position, found by inverting the bilinear map of the cell that covers it; where a grid folds over itself, the later
+/// cell (row-major) covers. Progress counts photographs, twice where seams are sought.
 ///
 /// # Errors
-/// [`trueup_core::Error::Options`]; [`trueup_core::Error::Input`] if corrections, grids and photographs do not fit together or the canvas is empty;
-/// [`trueup_core::Error::Unsolvable`] if a vertex is not finite; [`trueup_core::Error::Limits`] with the numbers, before any photograph is decoded, if
-/// memory or disk do not suffice; [`trueup_core::Error::Cancelled`]; and what the photographs return.
+/// [`trueup_core::Error::Options`]; [`trueup_core::Error::Input`] if corrections, grids and photographs do not fit
+/// together or the canvas is empty; [`trueup_core::Error::Unsolvable`] if a vertex is not finite;
+/// [`trueup_core::Error::Limits`] with the numbers, before any photograph is decoded, if memory or disk do not suffice;
+/// [`trueup_core::Error::Cancelled`]; and what the photographs return.
 ///
 /// # Departures
 /// The published renderer splits cells into two triangles with an affine map each, which kinks straight lines along the

@@ -24,8 +24,8 @@ pub struct Panorama {
 pub(super) enum PanoramaPixels {
     /// Sums over the photographs of weight * (red, green, blue) in linear light, and of the weights.
     Sums(PixelStore<SumPixel>),
-    /// Square roots of linear light, or where what is brighter than white is kept fourth roots, and alpha; 65535 is 1. Fine enough for 16
-    /// bits of the usual curves, and for light of twenty stops to half a percent.
+    /// Square roots of linear light, or where what is brighter than white is kept fourth roots, and alpha; 65535 is 1.
+    /// Fine enough for 16 bits of the usual curves, and for light of twenty stops to half a percent.
     Roots(PixelStore<RootPixel>),
 }
 
@@ -56,7 +56,8 @@ impl Panorama {
         Ok(())
     }
 
-    /// What of a `coverage`, that of the layout it was made of, nothing shows through: photographs may be transparent in part.
+    /// What of a `coverage`, that of the layout it was made of, nothing shows through: photographs may be transparent
+    /// in part.
     ///
     /// # Errors
     /// [`trueup_core::Error::Io`] if a scratch file cannot be read.

@@ -1,7 +1,7 @@
 //! Holes at the poles of a sphere, where a tripod stood.
 //!
-//! On the canvas such a hole is a strip, from inside a disc. What its border's colors differ by in direction must vanish toward its middle, which is
-//! one place, or they meet there in a star.
+//! On the canvas such a hole is a strip, from inside a disc. What its border's colors differ by in direction must
+//! vanish toward its middle, which is one place, or they meet there in a star.
 
 use crate::gaps::Gaps;
 use crate::pyramid::{PyramidPlane, color};
@@ -23,8 +23,8 @@ struct Hole {
 }
 
 impl Poles {
-    /// Of a canvas of `size` pixels; none unless it goes all the way round and is twice as wide as high. `surface` is what gaps are filled with,
-    /// `columns` those of its samples that go round once.
+    /// Of a canvas of `size` pixels; none unless it goes all the way round and is twice as wide as high. `surface` is
+    /// what gaps are filled with, `columns` those of its samples that go round once.
     pub(super) fn of(
         [width, height]: [usize; 2],
         gaps: &Gaps,
@@ -49,7 +49,8 @@ impl Poles {
         Self { height, holes: [hole(above, samples.clone().next()), hole(below, samples.last())] }
     }
 
-    /// A color that a gap is filled with in row `y`: the nearer a pole, the more like the mean around it, as a surface without bends is.
+    /// A color that a gap is filled with in row `y`: the nearer a pole, the more like the mean around it, as a surface
+    /// without bends is.
     pub(super) fn faded(&self, y: usize, [r, g, b]: [f32; 3]) -> [f32; 3] {
         let from_poles = [y, self.height - 1 - y];
         let near = self.holes.iter().zip(from_poles).find_map(|(hole, from)| {

@@ -10,8 +10,8 @@ use crate::memory_plan::Allowed;
 pub struct Resources<'a> {
     /// Bytes of memory for the photographs, the canvas and all that is made on the way.
     pub memory: usize,
-    /// Bytes that may be taken where `memory` is too little to compose at all; `memory` itself if that is the user's word and the program takes no
-    /// more beside than it is counted with.
+    /// Bytes that may be taken where `memory` is too little to compose at all; `memory` itself if that is the user's
+    /// word and the program takes no more beside than it is counted with.
     pub ceiling: usize,
     /// Where the canvas goes if it does not fit.
     pub scratch: &'a dyn ScratchSpace,

@@ -220,8 +220,8 @@ impl PhotographSource for Lights {
     }
 }
 
-/// Light of 0.01 to 160 times white over two photographs, of which the second was taken with a third of the light: it comes out as it is,
-/// from canvases of any kind, and a picture of it is neither white nor black.
+/// Light of 0.01 to 160 times white over two photographs, of which the second was taken with a third of the light: it
+/// comes out as it is, from canvases of any kind, and a picture of it is neither white nor black.
 #[test]
 fn light_above_white_comes_through() {
     let curve = TransferCurve::light(LightRange { white: 1.0, peak: 200.0 }).expect("a range");

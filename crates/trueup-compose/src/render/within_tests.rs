@@ -90,7 +90,8 @@ fn fill(panorama: &mut Panorama) -> usize {
     panorama.fill(&gaps, &StageContext::default()).expect("room")
 }
 
-/// A photograph of 300 x 200 pixels below a `strip` of empty rows, 20 at most, and above 100 more, of the levels at its pixels; and the strip, as gaps.
+/// A photograph of 300 x 200 pixels below a `strip` of empty rows, 20 at most, and above 100 more, of the levels at its
+/// pixels; and the strip, as gaps.
 fn below_a_strip(strip: usize, level: impl Fn(usize, usize) -> u8) -> (Panorama, Gaps) {
     let samples = (0..300 * 200).flat_map(|at| [level(at % 300, at / 300); 3]).collect();
     let raster = trueup_core::raster::Raster::from_data(300, 200, 3, samples).expect("as many samples");
@@ -125,8 +126,8 @@ fn gaps_take_up_the_colors_beside_them() {
     assert!(rows(&panorama)[first..] == before[first..]);
 }
 
-/// A slope of so much grain that is carried on into the strip above it, and one of none: what is filled has that of the photograph, and enough at
-/// least that a slope of a level in twenty columns is no row of bands.
+/// A slope of so much grain that is carried on into the strip above it, and one of none: what is filled has that of the
+/// photograph, and enough at least that a slope of a level in twenty columns is no row of bands.
 #[test]
 fn what_is_filled_has_the_grain_of_what_lies_beside_it() {
     let grains = |strength: f32| {
@@ -155,8 +156,8 @@ fn what_is_filled_has_the_grain_of_what_lies_beside_it() {
     assert!((0.35..0.55).contains(&filled), "{filled}");
 }
 
-/// A photograph that is a chessboard of squares of 10 pixels, gray with some grain: in the strip above, where the smooth surface would soon be of one gray,
-/// there are squares, whose sides go on those of the photograph.
+/// A photograph that is a chessboard of squares of 10 pixels, gray with some grain: in the strip above, where the
+/// smooth surface would soon be of one gray, there are squares, whose sides go on those of the photograph.
 #[test]
 fn what_repeats_itself_goes_on_in_a_gap() {
     const STRIP: usize = 20;
@@ -178,8 +179,8 @@ fn what_repeats_itself_goes_on_in_a_gap() {
     }
 }
 
-/// A sphere of 320 x 160 pixels, dark on one side and bright on the other, without its lowest 20 rows: beside the hole, both go on, and
-/// at the pole, which is one place, there is one color.
+/// A sphere of 320 x 160 pixels, dark on one side and bright on the other, without its lowest 20 rows: beside the hole,
+/// both go on, and at the pole, which is one place, there is one color.
 #[test]
 fn a_hole_at_a_pole_has_one_middle() {
     let samples = (0..330 * 140).flat_map(|at| [if (5..165).contains(&(at % 330)) { 60_u8 } else { 180 }; 3]).collect();
@@ -208,8 +209,8 @@ fn a_hole_at_a_pole_has_one_middle() {
     assert!(bright_end - dark_end > 80, "{dark_end} {bright_end}");
 }
 
-/// A bright sky over dark ground, with a dark post that reaches the upper border: the sky goes on into the strip above, the
-/// post and the ground do not.
+/// A bright sky over dark ground, with a dark post that reaches the upper border: the sky goes on into the strip above,
+/// the post and the ground do not.
 #[test]
 fn what_ends_at_the_border_is_not_carried_into_a_gap() {
     let scene = |x: usize, y: usize| if y >= 40 || (145..155).contains(&x) { 30 } else { 200 };
@@ -224,8 +225,8 @@ fn what_ends_at_the_border_is_not_carried_into_a_gap() {
     }
 }
 
-/// A bright sky that ends at a dark roof, of which the strip above sees as much as of the sky where they meet: all that reaches the border beyond it is sky,
-/// which is carried on to the corner. The mean of both was: a gray smear.
+/// A bright sky that ends at a dark roof, of which the strip above sees as much as of the sky where they meet: all that
+/// reaches the border beyond it is sky, which is carried on to the corner. The mean of both was: a gray smear.
 #[test]
 fn where_two_colors_meet_the_one_that_is_more_of_the_border_is_carried_on() {
     let (mut panorama, gaps) = below_a_strip(20, |x, _| if x < 30 { 90 } else { 250 });

@@ -9,9 +9,9 @@ use super::{MAX_TAPS, Sample, widened_taps};
 use crate::kernel::Bicubic;
 use crate::simd::{VectorLoop, with_vector_instructions};
 
-/// The photograph with `factor` times fewer pixels along each side, 1 to 15, the last column and row reaching beyond its
-/// border where they do not come out even; by a cubic kernel as much wider. With alpha it stays as it is: colors would have
-/// to be weighed by it.
+/// The photograph with `factor` times fewer pixels along each side, 1 to 15, the last column and row reaching beyond
+/// its border where they do not come out even; by a cubic kernel as much wider. With alpha it stays as it is: colors
+/// would have to be weighed by it.
 pub(crate) fn reduce_by(photograph: &Photograph, factor: f64) -> Option<Photograph> {
     match photograph {
         Photograph::Eight(raster) => reduced(raster, factor).map(Photograph::Eight),
@@ -73,7 +73,8 @@ impl<T: Sample, const C: usize> VectorLoop for OneRow<'_, T, C> {
         let Self { raster, across, down, sums, row, .. } = self;
         let clamped = |at: i64, size: usize| at.clamp(0, size as i64 - 1) as usize;
         sums.clear();
-        // Columns are read four values at a time, as many as vector instructions take, whatever follows the last channel.
+        // Columns are read four values at a time, as many as vector instructions take, whatever follows the last
+        // channel.
         sums.resize(raster.width() * C + LANES - C, 0.0);
         for (tap, &weight) in down.weights.iter().enumerate() {
             let samples = raster.row(clamped(down.first + tap as i64, raster.height()));

@@ -60,8 +60,8 @@ impl Sample for u16 {
 
 /// Interpolates a photograph at every position: red, green, blue and alpha from 0 to 255, not yet clamped.
 ///
-/// Positions outside see the nearest sample. `stretch` is how much wider than a sample the kernel is, along x and y: 1 to
-/// interpolate, more to average where the photograph is reduced. Colors next to transparent samples are weighted by
+/// Positions outside see the nearest sample. `stretch` is how much wider than a sample the kernel is, along x and y: 1
+/// to interpolate, more to average where the photograph is reduced. Colors next to transparent samples are weighted by
 /// alpha, so that what lies under a mask does not show. `at_border` is scratch space.
 pub(crate) fn interpolate<K: InterpolationKernel>(
     photograph: &Photograph,

@@ -5,7 +5,8 @@ use trueup_core::raster::Raster;
 use super::{MAX_STRETCH, OPAQUE, Sample};
 use crate::kernel::InterpolationKernel;
 
-/// Samples per axis that a narrow kernel is read from, whatever weighs nothing among them: as many as vector instructions take at once.
+/// Samples per axis that a narrow kernel is read from, whatever weighs nothing among them: as many as vector
+/// instructions take at once.
 pub(super) const NARROW_TAPS: usize = 8;
 
 /// Levels of as many pixels of three channels.
@@ -19,7 +20,8 @@ pub(super) fn is_narrow<K: InterpolationKernel>(stretch: f64) -> bool {
     2.0 * K::RADIUS * stretch.clamp(1.0, MAX_STRETCH) < NARROW_TAPS as f64
 }
 
-/// Normalized weights of a narrow kernel around each of some positions, along one axis: bit by bit those of [`widened_taps`](super::widened_taps).
+/// Normalized weights of a narrow kernel around each of some positions, along one axis: bit by bit those of
+/// [`widened_taps`](super::widened_taps).
 pub(super) struct NarrowTaps {
     /// The first sample.
     first: [f64; BLOCK],
@@ -41,7 +43,8 @@ impl NarrowTaps {
             *position = f64::from(whole) + f64::from(fraction);
         }
         let (mut first, mut last, mut start) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
-        // Loops instead of closures, which are functions of their own to the compiler, without the caller's vector instructions.
+        // Loops instead of closures, which are functions of their own to the compiler, without the caller's vector
+        // instructions.
         for at in 0..BLOCK {
             first[at] = (positions[at] - radius).ceil();
             last[at] = ((positions[at] + radius).floor() - first[at]) as f32;

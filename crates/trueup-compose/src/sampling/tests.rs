@@ -56,7 +56,8 @@ fn interpolation_is_the_kernels_sum() {
             sums.iter_mut().zip(pixel).for_each(|(sum, &level)| *sum += weight * f64::from(level));
         }
         for (found, expected) in found.iter().zip(sums) {
-            // Columns in 64ths of a level, over weights whose sizes add up to at most 1.25; weights in 16384ths, rounded.
+            // Columns in 64ths of a level, over weights whose sizes add up to at most 1.25; weights in 16384ths,
+            // rounded.
             assert!((f64::from(*found) - expected).abs() < 0.05, "{found} for {expected} at ({x}, {y})");
         }
         assert_eq!(found[3], 255.0);

@@ -69,7 +69,8 @@ impl Band {
         Self { width: self.width, turn: self.turn, rows }
     }
 
-    /// Those columns of row `y` that belong to it and lie in `columns`, which may run into the next turn, in ascending order.
+    /// Those columns of row `y` that belong to it and lie in `columns`, which may run into the next turn, in ascending
+    /// order.
     pub(super) fn within<'a>(&'a self, columns: &Range<usize>, y: usize) -> impl Iterator<Item = usize> + use<'a> {
         let row = &self.rows[y][..];
         let part = |columns: Range<usize>| {

@@ -11,7 +11,8 @@ use crate::small_views::{CLIPPED, Depths, IGNORED, KEPT, PARTLY, SmallPixel, Sma
 /// Cost of a seam for its length alone, gray levels of difference. Higher makes seams shorter.
 const LENGTH: f64 = 2.0;
 
-/// Weight of the difference of gradients beside that of colors. Higher keeps seams from crossing contours that do not meet.
+/// Weight of the difference of gradients beside that of colors. Higher keeps seams from crossing contours that do not
+/// meet.
 const GRADIENT_WEIGHT: f64 = 1.0;
 
 /// Cost of showing a photograph where its highlights are clipped and another one's are not, gray levels per pixel.
@@ -23,8 +24,8 @@ pub(super) const UNIT: i32 = 16;
 /// Cost of a pixel that the user does not want so: no seam that saves it is too long.
 const AGAINST_WISHES: i32 = 1 << 16;
 
-/// Difference taken for a pixel that only one of the two photographs shows: no less than any other, since at the border of
-/// a photograph there is no room to blend.
+/// Difference taken for a pixel that only one of the two photographs shows: no less than any other, since at the border
+/// of a photograph there is no room to blend.
 const UNSEEN: i32 = MAX_DIFFERENCE;
 
 /// A step between photographs that there is no room to blend counts as a slope of the shading by this part of it.
@@ -46,8 +47,8 @@ pub(super) struct SeamEnergy<'a> {
     gradients: Vec<Vec<[i16; 2]>>,
     /// Shading of every pixel of every view that is prepared; empty if it does not count.
     shading: Vec<Shading>,
-    /// For every canvas pixel that is prepared: by how much more than [`HIDDEN_STEP`] the photographs' mean brightness lies apart there, in [`FRACTION`]s
-    /// of a level. Empty if it does not count.
+    /// For every canvas pixel that is prepared: by how much more than [`HIDDEN_STEP`] the photographs' mean brightness
+    /// lies apart there, in [`FRACTION`]s of a level. Empty if it does not count.
     steps: Vec<i16>,
     depths: Vec<Depths>,
     softness: &'a [Softness],
@@ -121,8 +122,8 @@ impl<'a> SeamEnergy<'a> {
         }
     }
 
-    /// Finds what [`Self::seam_cost`] and [`Self::difference`] need, at the canvas pixels that are `wanted`; before that, and
-    /// elsewhere, they are not to be asked.
+    /// Finds what [`Self::seam_cost`] and [`Self::difference`] need, at the canvas pixels that are `wanted`; before
+    /// that, and elsewhere, they are not to be asked.
     pub(super) fn prepare_differences(&mut self, wanted: &Band) {
         let views = self.views;
         self.gradients = views.par_iter().map(|view| gradients(view, wanted)).collect();
@@ -218,9 +219,9 @@ impl<'a> SeamEnergy<'a> {
 
     /// Cost of a seam between neighboring canvas pixels, `a` shown at `p` and `b` at `q`; 0 for equal labels.
     ///
-    /// The differences at both pixels, of colors, gradients and shading: Kwatra and others, "Graphcut textures", SIGGRAPH
-    /// 2003, equation 1, with the gradients added instead of divided by: a division draws seams into textured parts,
-    /// which in photographs taken from different places fit worst.
+    /// The differences at both pixels, of colors, gradients and shading: Kwatra and others, "Graphcut textures",
+    /// SIGGRAPH 2003, equation 1, with the gradients added instead of divided by: a division draws seams into textured
+    /// parts, which in photographs taken from different places fit worst.
     pub(super) fn seam_cost(&self, p: [usize; 2], a: usize, q: [usize; 2], b: usize) -> i32 {
         if a == b {
             return 0;

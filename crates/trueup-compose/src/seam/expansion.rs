@@ -72,9 +72,9 @@ pub(super) fn deepest_at(energy: &SeamEnergy<'_>, [x, y]: [usize; 2]) -> Label {
 }
 
 impl Expansions {
-    /// Lets photograph `label` take the pixels of the box `columns` x `rows` where that lowers the cost most, all at once;
-    /// only pixels that are `free` change. Returns whether any did. Columns may run into the next turn of a cylinder; of a
-    /// box that goes all the way round, the first column stays as it is.
+    /// Lets photograph `label` take the pixels of the box `columns` x `rows` where that lowers the cost most, all at
+    /// once; only pixels that are `free` change. Returns whether any did. Columns may run into the next turn of a
+    /// cylinder; of a box that goes all the way round, the first column stays as it is.
     pub(super) fn expand(
         &mut self,
         energy: &SeamEnergy<'_>,

@@ -130,8 +130,8 @@ impl Seams {
         [label(left, top), label(right, top), label(left, bottom), label(right, bottom)]
     }
 
-    /// Labels of the points of row `v`, in pixels of this canvas, that lie `across` beside each other: `u` says where those of
-    /// `columns` are. Replaces `out`.
+    /// Labels of the points of row `v`, in pixels of this canvas, that lie `across` beside each other: `u` says where
+    /// those of `columns` are. Replaces `out`.
     fn along(&self, columns: &Range<usize>, u: impl Fn(usize) -> f64, across: f64, v: f64, out: &mut Vec<Label>) {
         out.clear();
         let mut x = columns.start;
@@ -160,8 +160,8 @@ impl Seams {
         }
     }
 
-    /// Labels of the pixels `columns` of row `y` of a canvas of `full` pixels (width, height), replacing `out`; [`NOBODY`]
-    /// where nothing is.
+    /// Labels of the pixels `columns` of row `y` of a canvas of `full` pixels (width, height), replacing `out`;
+    /// [`NOBODY`] where nothing is.
     pub fn row(&self, y: usize, columns: &Range<usize>, full: [usize; 2], out: &mut Vec<Label>) {
         let (across, down) = (self.width as f64 / full[0] as f64, self.height as f64 / full[1] as f64);
         let v = (y as f64 + 0.5) * down;
@@ -188,7 +188,8 @@ impl Seams {
         labels
     }
 
-    /// Labels of `width` x `height` places, evenly over a part of a canvas of `full` pixels (width, height), row by row.
+    /// Labels of `width` x `height` places, evenly over a part of a canvas of `full` pixels (width, height), row by
+    /// row.
     pub fn on_places(&self, part: &Rectangle, full: [usize; 2], [width, height]: [usize; 2]) -> Vec<Label> {
         let (across, down) = (self.width as f64 / full[0] as f64, self.height as f64 / full[1] as f64);
         let along = |range: &Range<usize>, place: usize, places: usize| {
@@ -216,8 +217,8 @@ impl Seams {
         found
     }
 
-    /// The columns of the first turn that are meant by `columns`, in one part or two, the second empty if there is none. Where they meet an end, a pixel of
-    /// the other end is among them.
+    /// The columns of the first turn that are meant by `columns`, in one part or two, the second empty if there is
+    /// none. Where they meet an end, a pixel of the other end is among them.
     fn in_first_turn(&self, columns: &Range<usize>, full: usize) -> [Range<usize>; 2] {
         if self.turn == 0 {
             return [columns.clone(), 0..0];

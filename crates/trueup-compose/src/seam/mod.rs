@@ -1,8 +1,8 @@
 //! Which photograph the panorama shows where: seams along which the photographs agree.
 //!
 //! Every canvas pixel is given to one photograph, so that nothing is shown twice. The seams between them run where the
-//! photographs look alike, stay away from the borders of the photographs, and do not cut things that moved. They are found
-//! on a small canvas by graph cuts and followed down to finer ones in a narrow band.
+//! photographs look alike, stay away from the borders of the photographs, and do not cut things that moved. They are
+//! found on a small canvas by graph cuts and followed down to finer ones in a narrow band.
 
 mod band;
 mod energy;
@@ -60,16 +60,17 @@ struct Labelled {
 /// Finds the seams between photographs.
 ///
 /// # Errors
-/// [`Error::Options`]; [`Error::Input`] if there are too many views or one does not fit the canvas; [`Error::Cancelled`].
+/// [`Error::Options`]; [`Error::Input`] if there are too many views or one does not fit the canvas;
+/// [`Error::Cancelled`].
 ///
 /// # Source
 /// Kwatra, Schoedl, Essa, Turk, Bobick, "Graphcut textures: image and video synthesis using graph cuts", SIGGRAPH 2003;
 /// Agarwala and others, "Interactive digital photomontage", SIGGRAPH 2004.
 ///
 /// # Departures
-/// Coarse to fine as Lombaert, Sun, Grady, Xu, "A multilevel banded graph cuts method for fast image segmentation", ICCV
-/// 2005; things that moved are found first, and their parts kept together; differences of shading count, the lack of detail, and steps that there is no room
-/// to blend, too.
+/// Coarse to fine as Lombaert, Sun, Grady, Xu, "A multilevel banded graph cuts method for fast image segmentation",
+/// ICCV 2005; things that moved are found first, and their parts kept together; differences of shading count, the lack
+/// of detail, and steps that there is no room to blend, too.
 pub fn run(input: &SeamInput<'_>, options: &SeamOptions, context: &StageContext) -> Result<Seams> {
     coarse_to_fine(input, COARSE_PIXELS, options, context)
 }

@@ -15,8 +15,8 @@ const MOVING_LOW: f64 = 14.0;
 
 /// Numbers the connected parts of the canvas where photographs differ; 0 where they do not.
 ///
-/// A pixel differs if no pixel of the other photograph within one step looks like it, both ways, so that misalignment by
-/// a pixel or two says nothing. Parts grow from strong differences into weak ones that touch them (hysteresis).
+/// A pixel differs if no pixel of the other photograph within one step looks like it, both ways, so that misalignment
+/// by a pixel or two says nothing. Parts grow from strong differences into weak ones that touch them (hysteresis).
 ///
 /// `turn` is the width of a canvas that is a cylinder, 0 on a plane.
 pub(super) fn moving_things(views: &[SmallView], [width, height]: [usize; 2], turn: usize) -> Vec<u32> {

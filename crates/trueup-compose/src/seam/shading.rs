@@ -9,11 +9,14 @@ pub(super) const FRACTION: i32 = 64;
 /// Pixels of the seams' canvas over which shading is averaged to either side; half of it across.
 const SHADING_REACH: usize = 4;
 
-/// How bright a view is around its pixels, and how that changes there. Where it is not wanted, zeros, which no memory need be touched for.
+/// How bright a view is around its pixels, and how that changes there. Where it is not wanted, zeros, which no memory
+/// need be touched for.
 pub(super) struct Shading {
-    /// Across and down: the mean brightness on one side minus that on the other, in [`FRACTION`]s of a gray level; 0 where one side shows nothing.
+    /// Across and down: the mean brightness on one side minus that on the other, in [`FRACTION`]s of a gray level; 0
+    /// where one side shows nothing.
     pub(super) slopes: Vec<[i16; 2]>,
-    /// One more than the mean brightness around the pixel, in [`FRACTION`]s of a gray level; 0 where nothing is covered.
+    /// One more than the mean brightness around the pixel, in [`FRACTION`]s of a gray level; 0 where nothing is
+    /// covered.
     pub(super) means: Vec<i16>,
 }
 
@@ -21,8 +24,8 @@ pub(super) struct Shading {
 ///
 /// The sides are half of [`SHADING_REACH`] pixels deep and reach that many pixels to either side along the line between
 /// them. Where two photographs differ in this, a panorama cannot go over from one to the other without a slope that
-/// neither shows, however wide the transition: it is what the eye takes for a seam in skies and on walls, while differences
-/// of single pixels have both signs along a seam and mean little there.
+/// neither shows, however wide the transition: it is what the eye takes for a seam in skies and on walls, while
+/// differences of single pixels have both signs along a seam and mean little there.
 pub(super) fn shading(view: &SmallView, wanted: &Band) -> Shading {
     let reach = SHADING_REACH;
     let (width, height) = (view.columns.len(), view.rows.len());
@@ -55,8 +58,8 @@ pub(super) fn shading(view: &SmallView, wanted: &Band) -> Shading {
 /// Sums of brightness over the pixels left of and above each corner, and their number.
 ///
 /// # Source
-/// Crow, "Summed-area tables for texture mapping", SIGGRAPH 1984. Sums wrap around; those of small boxes, their differences, do
-/// not.
+/// Crow, "Summed-area tables for texture mapping", SIGGRAPH 1984. Sums wrap around; those of small boxes, their
+/// differences, do not.
 struct Sums {
     /// Corners of a row, one more than pixels.
     corners: usize,

@@ -6,19 +6,19 @@ use rayon::prelude::*;
 
 use crate::small_views::{CLIPPED, SmallPixel, SmallView, WHOLLY, luma};
 
-/// Side of the squares of a view that detail is averaged in, pixels: wide enough for things that the photographs place a few
-/// pixels apart.
+/// Side of the squares of a view that detail is averaged in, pixels: wide enough for things that the photographs place
+/// a few pixels apart.
 const CELL_PX: usize = 8;
 
-/// Detail that noise and rounding alone may make, gray levels: a view's pixel is a mean of at least four of the photograph's, whose
-/// noise of one level, and the rounding's of 0.3, reach 2 to 3 levels in [`laplacian`].
+/// Detail that noise and rounding alone may make, gray levels: a view's pixel is a mean of at least four of the
+/// photograph's, whose noise of one level, and the rounding's of 0.3, reach 2 to 3 levels in [`laplacian`].
 const NOISE: f64 = 3.0;
 
 /// Share of the detail that may be missing for other reasons than focus: another lens's corner, another resampling.
 const TOLERANCE: f64 = 0.3;
 
-/// Largest difference of a channel's mean, gray levels, at which two photographs are taken to show the same: exposures are evened
-/// out to a few levels, and a thing that stands in one of them only stands out by more.
+/// Largest difference of a channel's mean, gray levels, at which two photographs are taken to show the same: exposures
+/// are evened out to a few levels, and a thing that stands in one of them only stands out by more.
 const SAME: f64 = 12.0;
 
 /// The detail of a view, cell by cell.
@@ -48,8 +48,8 @@ pub(super) struct Softness {
 impl Softness {
     /// Of every view, beside all that meet it; `turn` as for [`SmallView::index_around`].
     ///
-    /// Detail is the mean size of the Laplacian, the measure of focus of Nayar and Nakagawa, "Shape from focus", PAMI 1994. It is compared only
-    /// where photographs agree in what is left of them without it.
+    /// Detail is the mean size of the Laplacian, the measure of focus of Nayar and Nakagawa, "Shape from focus",
+    /// PAMI 1994. It is compared only where photographs agree in what is left of them without it.
     pub(super) fn of(views: &[SmallView], turn: usize) -> Vec<Self> {
         let details: Vec<Detail> = views.par_iter().map(Detail::of).collect();
         (0..views.len()).into_par_iter().map(|own| Self::beside(views, &details, own, turn)).collect()
@@ -77,8 +77,8 @@ impl Softness {
         Self { columns: view.columns.clone(), rows: view.rows.clone(), missing }
     }
 
-    /// The share that is missing, in 255ths, at a pixel of the canvas that was halved so often; in the view's own columns, which may run into the
-    /// next turn.
+    /// The share that is missing, in 255ths, at a pixel of the canvas that was halved so often; in the view's own
+    /// columns, which may run into the next turn.
     pub(super) fn at(&self, [x, y]: [usize; 2], halvings: u32) -> u8 {
         let cell = |range: &Range<usize>, at: usize| {
             let middle = (at << halvings) + (1 << halvings) / 2;

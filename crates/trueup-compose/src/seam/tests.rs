@@ -56,8 +56,9 @@ fn a_thing_that_moved_is_shown_whole_or_not_at_all() {
     }
 }
 
-/// In the middle of the overlap one photograph brightens by 2 levels a column beside the other; they agree along one column, but no
-/// transition hides that slope. Elsewhere they differ by 12 levels of alternating sign, which mean nothing at a distance.
+/// In the middle of the overlap one photograph brightens by 2 levels a column beside the other; they agree along one
+/// column, but no transition hides that slope. Elsewhere they differ by 12 levels of alternating sign, which mean
+/// nothing at a distance.
 #[test]
 fn seams_keep_away_from_slopes_of_shading() {
     let slope = 70..90;
@@ -89,8 +90,9 @@ fn clipped_parts_are_shown_by_who_is_not_clipped() {
     assert!((30..100).all(|x| seams.labels()[5 * 120 + x] == 1));
 }
 
-/// A sky that the first photograph has white, 20 levels above the second one's, whose border lies at column 20: the deepest of its pixels are 30 from it, so
-/// that transitions want 6. Where the step counts, the second photograph is shown only from there on.
+/// A sky that the first photograph has white, 20 levels above the second one's, whose border lies at column 20: the
+/// deepest of its pixels are 30 from it, so that transitions want 6. Where the step counts, the second photograph is
+/// shown only from there on.
 #[test]
 fn steps_between_photographs_are_left_room() {
     let mut clipped = view(0..100, 0..60, |_, _| 255);
@@ -109,7 +111,8 @@ fn steps_between_photographs_are_left_room() {
 
 #[test]
 fn what_is_in_focus_is_shown() {
-    // Columns of 80 and 120 levels. The first photograph, deeper by far where both show them, has them blurred in a disc.
+    // Columns of 80 and 120 levels. The first photograph, deeper by far where both show them, has them blurred in a
+    // disc.
     let inside = |x: usize, y: usize| x.abs_diff(70).pow(2) + y.abs_diff(40).pow(2) < 20 * 20;
     let stripes = |x: usize| if x.is_multiple_of(2) { 80 } else { 120 };
     let first = view(0..160, 0..80, |x, y| if inside(x, y) { 100 } else { stripes(x) });

@@ -24,7 +24,8 @@ impl Rgb8<'_> {
     }
 }
 
-/// Interpolates 8-bit RGB at every position by cubic convolution, on the scale of 0 to 255 and not yet clamped; the fourth value is 255.
+/// Interpolates 8-bit RGB at every position by cubic convolution, on the scale of 0 to 255 and not yet clamped; the
+/// fourth value is 255.
 ///
 /// Returns nothing for positions too near the border for a whole window: their indices go to `at_border`.
 pub(crate) fn cubic_rgb8(picture: Rgb8<'_>, positions: &Positions, out: &mut [[f32; 4]], at_border: &mut Vec<usize>) {
@@ -137,7 +138,8 @@ fn level(columns: [i32; 4], weights: [i32; 4]) -> f32 {
     (0..4).map(|tap| columns[tap] * weights[tap]).sum::<i32>() as f32 * SCALE
 }
 
-/// The 4 x 4 pixels around one position as the interpolation weighs them, columns of rows, for positions whose window is cut by the border.
+/// The 4 x 4 pixels around one position as the interpolation weighs them, columns of rows, for positions whose window
+/// is cut by the border.
 pub(crate) fn cubic_window(window: [[[u8; 3]; 4]; 4], fraction_x: f32, fraction_y: f32) -> [f32; 4] {
     let [wx, wy] = [fraction_x, fraction_y].map(|fraction| PairedTaps::of(&[fraction]).weights(0));
     let channel = |c: usize| level(window.map(|column| column_sum(column.map(|pixel| pixel[c]), wy)), wx);

@@ -19,7 +19,8 @@ pub(crate) struct Contribution<'a> {
     pub(crate) weighting: Weighting,
 }
 
-/// Linearizes `samples` (red, green, blue, alpha from 0 to 255), weighs them and joins them to the canvas pixels `sums`.
+/// Linearizes `samples` (red, green, blue, alpha from 0 to 255), weighs them and joins them to the canvas pixels
+/// `sums`.
 pub(crate) fn accumulate(
     contribution: Contribution<'_>,
     positions: &Positions,
@@ -76,8 +77,8 @@ pub(crate) struct Development<'a> {
     pub(crate) border_footprint: Option<[f32; 2]>,
 }
 
-/// Turns `samples` (red, green, blue, alpha from 0 to 255) in place into square roots of corrected linear light, or fourth roots where what
-/// is brighter than white is kept, and the share of the canvas pixel that is covered, 0 to 1.
+/// Turns `samples` (red, green, blue, alpha from 0 to 255) in place into square roots of corrected linear light, or
+/// fourth roots where what is brighter than white is kept, and the share of the canvas pixel that is covered, 0 to 1.
 pub(crate) fn develop(development: Development<'_>, positions: &Positions, samples: &mut [[f32; 4]]) {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
@@ -162,8 +163,8 @@ fn corrected(light: &LightTable, samples: &[[f32; 4]], lifts: &[f32; BLOCK]) -> 
 /// The share that is covered of a sample, for each level of its opacity.
 const SHARE_PER_LEVEL: f32 = 1.0 / 255.0;
 
-/// The share of a canvas pixel that a sample covers: what is transparent of it covers nothing, and neither does what lies
-/// beyond the photograph's border.
+/// The share of a canvas pixel that a sample covers: what is transparent of it covers nothing, and neither does what
+/// lies beyond the photograph's border.
 #[inline(always)]
 fn share(
     opacity: f32,
@@ -348,8 +349,8 @@ mod x86 {
         let mut at = [0_i32; LANES];
         // SAFETY: there is room for eight.
         unsafe { _mm256_storeu_si256(at.as_mut_ptr().cast(), _mm256_castps_si256(rounded)) };
-        // In the order in which the halves of both vectors are taken apart below. Read one by one: a gather is no faster, and not every emulator
-        // reads the same. Their low bits are the whole numbers.
+        // In the order in which the halves of both vectors are taken apart below. Read one by one: a gather is no
+        // faster, and not every emulator reads the same. Their low bits are the whole numbers.
         let entries = [0, 1, 4, 5, 2, 3, 6, 7].map(|lane: usize| table.entries()[at[lane] as usize % ENTRIES]);
         // SAFETY: eight entries are sixteen floats.
         let (first, second) = unsafe {
@@ -406,8 +407,8 @@ mod tests {
     use super::*;
     use crate::light::{Correction, PhotographLight};
 
-    /// With vector instructions and without, to the last bit: dark, bright and clipped colors, darkened and brightened, with a shoulder, half of
-    /// one and none.
+    /// With vector instructions and without, to the last bit: dark, bright and clipped colors, darkened and brightened,
+    /// with a shoulder, half of one and none.
     #[test]
     fn every_processor_shows_the_same_light() {
         let levels = [0.0, 90.5, 214.0, 236.25, 243.0, 250.0, 254.6, 255.0];

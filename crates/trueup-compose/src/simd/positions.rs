@@ -5,8 +5,8 @@ use crate::linear_table::ROUNDING;
 
 /// The inverse of one cell's bilinear map along one canvas row.
 ///
-/// A point of the cell is `p = u e + v f + u v g` from its top left corner, with `e` the top edge, `f` the left edge and
-/// `g` the deviation from a parallelogram. Crossing `p - v f = u (e + v g)` with `e + v g` leaves a quadratic in v,
+/// A point of the cell is `p = u e + v f + u v g` from its top left corner, with `e` the top edge, `f` the left edge
+/// and `g` the deviation from a parallelogram. Crossing `p - v f = u (e + v g)` with `e + v g` leaves a quadratic in v,
 /// `(g x f) v^2 + (e x f + p x g) v + p x e = 0`, whose discriminant's root is the Jacobian: its sign picks the root.
 ///
 /// # Source
@@ -24,15 +24,16 @@ pub(crate) struct InverseBilinear {
     y: f64,
 }
 
-/// Largest side of a cell, pixels of the photograph, whose inverse single precision gives to 2^-14 of a pixel: what it is off by is a few times
-/// 2^-24 of the side. A cell of the mesh is 40 pixels of the working copy.
+/// Largest side of a cell, pixels of the photograph, whose inverse single precision gives to 2^-14 of a pixel: what it
+/// is off by is a few times 2^-24 of the side. A cell of the mesh is 40 pixels of the working copy.
 const SINGLE_PRECISION_PX: f64 = 256.0;
 
 /// The same for its side on the canvas.
 const SINGLE_PRECISION_CANVAS_PX: f64 = 1024.0;
 
-/// Smallest Jacobian of such a cell, as a share of the product of its longest sides: where a cell all but folds, the discriminant is a small
-/// difference of two large numbers, and what is off by r relative to them is off by r / (4 share^2) in the root.
+/// Smallest Jacobian of such a cell, as a share of the product of its longest sides: where a cell all but folds, the
+/// discriminant is a small difference of two large numbers, and what is off by r relative to them is off by r / (4
+/// share^2) in the root.
 const SINGLE_PRECISION_JACOBIAN_SHARE: f64 = 0.5;
 
 fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
@@ -40,8 +41,8 @@ fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
 }
 
 impl InverseBilinear {
-    /// For the cell with the given corners (top left, top right, bottom right, bottom left, canvas pixels), whose top left
-    /// is `source` in the photograph and whose extent there is `source_size`; `y` is the row's pixel center.
+    /// For the cell with the given corners (top left, top right, bottom right, bottom left, canvas pixels), whose top
+    /// left is `source` in the photograph and whose extent there is `source_size`; `y` is the row's pixel center.
     pub(crate) fn new(corners: [[f64; 2]; 4], source: [f64; 2], source_size: [f64; 2], y: f64) -> Self {
         let [a, b, c, d] = corners;
         let e = [b[0] - a[0], b[1] - a[1]];
@@ -68,8 +69,8 @@ impl InverseBilinear {
     }
 }
 
-/// Positions in a photograph for consecutive pixels of a canvas row, split into whole pixel and fraction: the position is
-/// `(column + fraction_x + 0.5, row + fraction_y + 0.5)`, fractions in [0, 1].
+/// Positions in a photograph for consecutive pixels of a canvas row, split into whole pixel and fraction: the position
+/// is `(column + fraction_x + 0.5, row + fraction_y + 0.5)`, fractions in [0, 1].
 #[derive(Debug, Default)]
 pub(crate) struct Positions {
     pub(crate) column: Vec<i32>,
@@ -114,7 +115,8 @@ pub(crate) fn invert_row(cell: &InverseBilinear, first: usize, positions: &mut P
     invert_row_portable(cell, first, positions);
 }
 
-/// [`invert_row`] of a small cell that is far from folding, in single precision: twice as many pixels side by side, whose square roots and quotients take less.
+/// [`invert_row`] of a small cell that is far from folding, in single precision: twice as many pixels side by side,
+/// whose square roots and quotients take less.
 struct SmallCell<'a> {
     cell: &'a InverseBilinear,
     first: usize,
@@ -160,7 +162,8 @@ impl VectorLoop for SmallCell<'_> {
                 .min(1.0);
             let x = right_of_left + u * size[0];
             let y = below_top + v * size[1];
-            // Neither is below 0: half a pixel less, rounded, is the whole number at or below; at one itself either side will do.
+            // Neither is below 0: half a pixel less, rounded, is the whole number at or below; at one itself either
+            // side will do.
             let rounded = [(x - 0.5) + ROUNDING, (y - 0.5) + ROUNDING];
             let whole = [rounded[0] - ROUNDING, rounded[1] - ROUNDING];
             columns[index] = left.wrapping_add(rounded[0].to_bits().wrapping_sub(ROUNDING.to_bits()) as i32);
@@ -226,7 +229,8 @@ mod x86 {
 mod tests {
     use super::*;
 
-    /// Cells of 40 pixels of a photograph, far from its corner, drawn leaning, squeezed and bulging, a pixel row through the middle of each.
+    /// Cells of 40 pixels of a photograph, far from its corner, drawn leaning, squeezed and bulging, a pixel row
+    /// through the middle of each.
     fn cells() -> Vec<InverseBilinear> {
         let corner = [2317.25, 1840.6];
         let shapes = [

@@ -76,8 +76,8 @@ const SAMPLED_BELOW: u32 = 1;
 
 /// The first level of a photograph from its samples [`SAMPLED_BELOW`] it: what of it is coarser than two samples.
 ///
-/// Photographs are read at different places between their own samples; what they say of the finest contours there differs
-/// although they agree. The band that is left out here is blended with the fine levels.
+/// Photographs are read at different places between their own samples; what they say of the finest contours there
+/// differs although they agree. The band that is left out here is blended with the fine levels.
 fn coarser_than_two_samples(sampled: PyramidPlane<[f32; 4]>) -> PyramidPlane<[f32; 4]> {
     let mut level = sampled;
     for _ in 0..SAMPLED_BELOW {
@@ -88,8 +88,8 @@ fn coarser_than_two_samples(sampled: PyramidPlane<[f32; 4]>) -> PyramidPlane<[f3
     base
 }
 
-/// Gives samples beside covered ones their neighbors' color with next to no share, so that finer samples between the two
-/// always have something to be compared with.
+/// Gives samples beside covered ones their neighbors' color with next to no share, so that finer samples between the
+/// two always have something to be compared with.
 fn spread(plane: &mut PyramidPlane<[f32; 4]>) {
     let (width, height) = (plane.columns.len(), plane.rows.len());
     let old = plane.texels.clone();

@@ -16,8 +16,8 @@ use crate::window::Window;
 /// Level of the camera's own values (0 to 255) from which on a channel counts as saturated.
 const SATURATED: f32 = 252.0;
 
-/// A photograph as the search for seams sees it; `period` is the width of the small canvas if it is a cylinder. `view_levels` are those
-/// of [`Encoding::view_levels`](crate::transfer_curve::Encoding::view_levels).
+/// A photograph as the search for seams sees it; `period` is the width of the small canvas if it is a cylinder.
+/// `view_levels` are those of [`Encoding::view_levels`](crate::transfer_curve::Encoding::view_levels).
 pub(super) fn small_view(
     warped: &WarpedPhotograph<'_>,
     masks: &Masks,

@@ -48,7 +48,8 @@ pub(crate) struct SmallViewsInput<'a> {
     /// What is done to the light of all of them, over the layout that was unrolled.
     pub(crate) local: Option<&'a LocalExposure>,
     pub(crate) photographs: &'a dyn PhotographSource,
-    /// Levels of the views by their roots, where these are not the levels; see [`Encoding::view_levels`](crate::transfer_curve::Encoding::view_levels).
+    /// Levels of the views by their roots, where these are not the levels; see
+    /// [`Encoding::view_levels`](crate::transfer_curve::Encoding::view_levels).
     pub(crate) view_levels: Option<&'a EncodeRoots>,
     /// Log2 of the canvas pixels per sample of the coarse levels; `None` if there are to be none.
     pub(crate) first_level: Option<u32>,
@@ -107,7 +108,8 @@ pub struct MadeSmall {
 const MOST_PIXEL_BYTES: f64 = 8.0;
 
 impl MadeSmall {
-    /// Whether it can have been made of the photograph at a position: boxes lie on their canvases and have their pixels.
+    /// Whether it can have been made of the photograph at a position: boxes lie on their canvases and have their
+    /// pixels.
     fn fits(&self, input: &SmallViewsInput<'_>, position: usize) -> bool {
         let unrolled = input.unrolled;
         let layout = unrolled.original_layout();
@@ -156,7 +158,8 @@ pub(crate) fn run(input: &SmallViewsInput<'_>, context: &StageContext) -> Result
 /// Takes what a photograph became, with its position among [`placed`](crate::layout::CanvasLayout::placed).
 pub type TakeSmall<'a> = &'a mut dyn FnMut(usize, MadeSmall) -> Result<()>;
 
-/// The same, where the photographs are made small by others: `make_small` has those at the positions that it is told made so.
+/// The same, where the photographs are made small by others: `make_small` has those at the positions that it is told
+/// made so.
 ///
 /// # Errors
 /// Those of `make_small`; [`trueup_core::Error::Input`] if what they give cannot be; those of a scratch file.

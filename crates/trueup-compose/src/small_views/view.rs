@@ -20,8 +20,8 @@ pub const IGNORED: u8 = 8;
 /// The user wants this photograph here.
 pub const KEPT: u8 = 16;
 
-/// One pixel of a view: red, green and blue (square root of linear light, 255 is white; where what is brighter than white is kept, as it is
-/// written with 8 bits) and flags.
+/// One pixel of a view: red, green and blue (square root of linear light, 255 is white; where what is brighter than
+/// white is kept, as it is written with 8 bits) and flags.
 pub type SmallPixel = [u8; 4];
 
 /// Brightness of a pixel in 256ths of a level: Rec. 601 luma.
@@ -128,7 +128,8 @@ fn mean_of_four(four: [SmallPixel; 4]) -> SmallPixel {
 
 /// [`Depths::lack_of_room`] where there is none.
 pub(crate) const WHOLE_LACK: i32 = 256;
-/// The widest transitions reach over a tenth of a photograph's side (`render.transition`): a fifth of the way from its border to its middle.
+/// The widest transitions reach over a tenth of a photograph's side (`render.transition`): a fifth of the way from its
+/// border to its middle.
 const ROOM_PARTS: u32 = 5;
 
 /// How deep the pixels of a view lie inside its photograph.
@@ -145,7 +146,8 @@ impl Depths {
         (u64::from(self.distances[index]) * 255 / u64::from(self.largest)) as u8
     }
 
-    /// How much of the room that a wide transition takes is missing between a pixel of the box and the border, in [`WHOLE_LACK`]s; 0 deep inside.
+    /// How much of the room that a wide transition takes is missing between a pixel of the box and the border, in
+    /// [`WHOLE_LACK`]s; 0 deep inside.
     #[inline]
     pub(crate) fn lack_of_room(&self, index: usize) -> i32 {
         let room = (self.largest / ROOM_PARTS).max(1);

@@ -17,8 +17,8 @@ const BANDS_BYTES: usize = 64 << 20;
 /// Rows read at once: as many as make reads of every block worth a disk's while.
 const BAND_ROWS: usize = 32;
 
-/// A canvas in a scratch file: blocks of `side` columns and rows (those at the ends are smaller), the rows of blocks from top
-/// to bottom, their blocks from left to right, each row-major.
+/// A canvas in a scratch file: blocks of `side` columns and rows (those at the ends are smaller), the rows of blocks
+/// from top to bottom, their blocks from left to right, each row-major.
 #[derive(Debug)]
 pub(crate) struct CanvasBlocks<P> {
     file: Arc<dyn ScratchFile>,

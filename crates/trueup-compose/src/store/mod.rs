@@ -30,7 +30,8 @@ pub(crate) struct Block<'a, P> {
 }
 
 impl<P> Block<'_, P> {
-    /// Whether it is one of the tiles of this `side`, on a canvas of this size, that have something in common with a part of it.
+    /// Whether it is one of the tiles of this `side`, on a canvas of this size, that have something in common with a
+    /// part of it.
     pub(crate) fn is_tile_of(&self, part: &Rectangle, side: usize, canvas: [usize; 2]) -> bool {
         let is_one = |range: &Range<usize>, part: &Range<usize>, length: usize| {
             range.start.is_multiple_of(side)
@@ -79,8 +80,8 @@ impl<P: Pixel> PixelStore<P> {
         }
     }
 
-    /// The rows of tiles of the canvas, so that all of them can be set at the same time; `None` if it is not in memory. Tiles do not
-    /// overlap, and those that have a row in common have all their rows in common.
+    /// The rows of tiles of the canvas, so that all of them can be set at the same time; `None` if it is not in memory.
+    /// Tiles do not overlap, and those that have a row in common have all their rows in common.
     pub(crate) fn tiles_mut(&mut self, tiles: &[Rectangle]) -> Option<Vec<Vec<&mut [P]>>> {
         let Self::Memory { width, pixels } = self else { return None };
         let mut in_order: Vec<usize> = (0..tiles.len()).collect();

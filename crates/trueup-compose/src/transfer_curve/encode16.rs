@@ -7,10 +7,10 @@ use trueup_core::color::TransferCurve;
 use super::ScaledCurve;
 use super::by_curve::scaled_table_of;
 
-/// Steps of [`Encode16`]. Against the square root of linear light sRGB's curve bends by at most 25.8 (twice its slope near
-/// black, 12.92), so that the chord between entries is off by 25.8 / 8 / 4095^2 = 2e-7: an 80th of a 16-bit step. Where
-/// the curve's two pieces meet its slope changes by 0.025, and the chord across is off by up to 0.025 / 4 / 4095: a tenth
-/// of a step. A plain gamma of 2.2 is off by up to 1.3 steps between black and the first entry.
+/// Steps of [`Encode16`]. Against the square root of linear light sRGB's curve bends by at most 25.8 (twice its slope
+/// near black, 12.92), so that the chord between entries is off by 25.8 / 8 / 4095^2 = 2e-7: an 80th of a 16-bit step.
+/// Where the curve's two pieces meet its slope changes by 0.025, and the chord across is off by up to 0.025 / 4 / 4095:
+/// a tenth of a step. A plain gamma of 2.2 is off by up to 1.3 steps between black and the first entry.
 const ROOT_STEPS: usize = 4095;
 
 /// 16-bit levels from linear light, off by hardly more than the rounding.

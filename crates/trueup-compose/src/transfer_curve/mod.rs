@@ -18,7 +18,8 @@ pub(crate) use linearize::Linearize;
 
 /// How a finished picture is written: its curve, and that curve's tables.
 ///
-/// Pixels hold square roots of light; of light that may be brighter than white, which spans many more stops, fourth roots.
+/// Pixels hold square roots of light; of light that may be brighter than white, which spans many more stops, fourth
+/// roots.
 #[derive(Debug, Clone)]
 pub(crate) struct Encoding {
     curve: TransferCurve,

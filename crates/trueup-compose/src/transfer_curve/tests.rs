@@ -49,8 +49,8 @@ fn a_curve_with_a_level_stretch_is_encoded_without_harm() {
 fn sixteen_bits_are_off_by_hardly_more_than_half_a_level() {
     let steps = 1_000_000;
     for curve in curves() {
-        // The table of 1024 entries has its sharpest kink behind the first: against the root of light the slope falls from
-        // 1.41 to 0.52 there, and the chord across is off by up to 0.9 / 4 / 4095, 3.6 steps.
+        // The table of 1024 entries has its sharpest kink behind the first: against the root of light the slope falls
+        // from 1.41 to 0.52 there, and the chord across is off by up to 0.9 / 4 / 4095, 3.6 steps.
         let tolerance = if curve == TransferCurve::SRGB { 0.6 } else { 4.2 };
         let encode = Encode16::of(&curve);
         let mut last = 0;

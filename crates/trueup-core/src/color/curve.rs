@@ -59,8 +59,8 @@ impl TransferCurve {
         finite.then_some(Self(Kind::Parametric(coefficients)))?.if_usable()
     }
 
-    /// A curve through evenly spaced samples, the first at 0 and the last at 1. `None` for fewer than two, or if it is no
-    /// curve from 0 to 1 that never falls.
+    /// A curve through evenly spaced samples, the first at 0 and the last at 1. `None` for fewer than two, or if it is
+    /// no curve from 0 to 1 that never falls.
     pub fn table(samples: Vec<f64>) -> Option<Self> {
         let rising = samples.windows(2).all(|pair| pair[0] <= pair[1]);
         (samples.len() >= 2 && rising).then(|| Self(Kind::Table(samples.into())))?.if_usable()
@@ -87,8 +87,8 @@ impl TransferCurve {
         }
     }
 
-    /// The encoded value (0 to 1) that stands for linear light; where several do, the middle one, but 0 for no light and 1
-    /// for all. NaN gives 0.
+    /// The encoded value (0 to 1) that stands for linear light; where several do, the middle one, but 0 for no light
+    /// and 1 for all. NaN gives 0.
     pub fn encoded(&self, linear: f64) -> f64 {
         let y = unit(linear);
         match &self.0 {
@@ -133,8 +133,8 @@ impl TransferCurve {
         if self.is_same(&Self::SRGB) { Self::SRGB } else { self }
     }
 
-    /// The curve of samples that keep what is brighter than white: full light is [`LightRange::peak`]. `None` if the range is not
-    /// [sound](LightRange::is_sound).
+    /// The curve of samples that keep what is brighter than white: full light is [`LightRange::peak`]. `None` if the
+    /// range is not [sound](LightRange::is_sound).
     pub fn light(range: LightRange) -> Option<Self> {
         LightCurve::new(range).map(|curve| Self(Kind::Light(curve)))
     }

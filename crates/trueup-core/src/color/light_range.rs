@@ -2,11 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The light that samples from 0 to 1 stand for, where they keep what is brighter than white, in the unit of the files it comes from.
+/// The light that samples from 0 to 1 stand for, where they keep what is brighter than white, in the unit of the files
+/// it comes from.
 ///
-/// Up to `white`, a picture made of the samples looks like one of sRGB, a little darker; from there on the samples rise ever more slowly
-/// with the logarithm of the light, up to `peak`. So it can be looked at and measured like any picture, and no light is lost: with 16 bits a
-/// sample is within a thousandth of its light from a thousandth of `white` up to ten thousand times of it, and within two up to a million times.
+/// Up to `white`, a picture made of the samples looks like one of sRGB, a little darker; from there on the samples rise
+/// ever more slowly with the logarithm of the light, up to `peak`. So it can be looked at and measured like any
+/// picture, and no light is lost: with 16 bits a sample is within a thousandth of its light from a thousandth of
+/// `white` up to ten thousand times of it, and within two up to a million times.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LightRange {
     /// Light that is drawn as a photograph's brightest ordinary tones; above 0.
@@ -15,14 +17,16 @@ pub struct LightRange {
     pub peak: f64,
 }
 
-/// Share of the samples, at most, that light above [`LightRange::white`] takes: what is left to ordinary tones keeps their contrast well
-/// enough to be measured, and 16 bits hold a million times `white` in it.
+/// Share of the samples, at most, that light above [`LightRange::white`] takes: what is left to ordinary tones keeps
+/// their contrast well enough to be measured, and 16 bits hold a million times `white` in it.
 const HIGHLIGHTS: f64 = 0.3;
 
-/// Slope at white of sRGB's curve against the natural logarithm of the light, 1.055 / 2.4 (IEC 61966-2-1:1999, equation 6).
+/// Slope at white of sRGB's curve against the natural logarithm of the light, 1.055 / 2.4 (IEC 61966-2-1:1999, equation
+/// 6).
 const SLOPE_AT_WHITE: f64 = 1.055 / 2.4;
 
-/// Largest [`LightRange::peak`] in units of [`LightRange::white`]: 60 stops, more than floating point numbers of 16 bits span.
+/// Largest [`LightRange::peak`] in units of [`LightRange::white`]: 60 stops, more than floating point numbers of 16
+/// bits span.
 const MOST_RATIO: f64 = (1_u64 << 60) as f64;
 
 /// Halvings in which the bend of the highlights is found: as many as a number has bits.
@@ -60,7 +64,8 @@ impl LightCurve {
         if rise(0.0) <= room {
             return Some(Self { range, knee, bend: 0.0 });
         }
-        // The rise falls with the bend, to nothing: ln(1 + b x) / b < room from b = x / room^2 on, as ln(1 + y) < sqrt(y).
+        // The rise falls with the bend, to nothing: ln(1 + b x) / b < room from b = x / room^2 on, as ln(1 + y) <
+        // sqrt(y).
         let (mut low, mut high) = (0.0, SLOPE_AT_WHITE * knee * stretch / (room * room));
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);

@@ -17,7 +17,8 @@ impl Default for ToneSums {
 }
 
 impl ToneSums {
-    /// Adds a pixel of `level` in the one picture and `other` in the other one, both on the scale of 0 to 255. NaN counts for nothing.
+    /// Adds a pixel of `level` in the one picture and `other` in the other one, both on the scale of 0 to 255. NaN
+    /// counts for nothing.
     pub fn add(&mut self, level: f32, other: f32) {
         if level.is_nan() || other.is_nan() {
             return;
@@ -29,21 +30,22 @@ impl ToneSums {
     }
 }
 
-/// The level in one exposure that belongs to each level of another one: it never falls. Whatever a camera does to its light, the
-/// brighter of two places is the brighter one in all exposures.
+/// The level in one exposure that belongs to each level of another one: it never falls. Whatever a camera does to its
+/// light, the brighter of two places is the brighter one in all exposures.
 ///
 /// # Source
-/// The comparagram of Mann, "Comparametric equations with practical applications in quantigraphic image processing", IEEE TIP 9(8), 2000;
-/// fitted by pooling adjacent violators (Ayer and others, "An empirical distribution function for sampling with incomplete
-/// information", Annals of Mathematical Statistics 26(4), 1955), which is the least-squares relation among all that never fall.
+/// The comparagram of Mann, "Comparametric equations with practical applications in quantigraphic image processing",
+/// IEEE TIP 9(8), 2000; fitted by pooling adjacent violators (Ayer and others, "An empirical distribution function for
+/// sampling with incomplete information", Annals of Mathematical Statistics 26(4), 1955), which is the least-squares
+/// relation among all that never fall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToneRelation {
     levels: Vec<f32>,
 }
 
 impl ToneRelation {
-    /// The relation that fits best; `None` without a single pixel. Levels that no pixel has are interpolated, beyond the first and the
-    /// last one they are those of these.
+    /// The relation that fits best; `None` without a single pixel. Levels that no pixel has are interpolated, beyond
+    /// the first and the last one they are those of these.
     pub fn fit(sums: &ToneSums) -> Option<Self> {
         /// Neighboring levels that have one mean.
         struct Block {
@@ -80,11 +82,13 @@ impl ToneRelation {
         Some(Self { levels })
     }
 
-    /// The other exposure's level, 0 to 255, for `level`, between those that are known; what is beyond 0 to 255 is taken for the nearer end.
+    /// The other exposure's level, 0 to 255, for `level`, between those that are known; what is beyond 0 to 255 is
+    /// taken for the nearer end.
     #[inline]
     pub fn at(&self, level: f32) -> f32 {
         let level = level.clamp(0.0, (LEVELS - 1) as f32);
-        // A level that is no number has none in the other picture: the cast makes it zero, the fraction stays no number.
+        // A level that is no number has none in the other picture: the cast makes it zero, the fraction stays no
+        // number.
         let below = (level as usize).min(LEVELS - 2);
         let fraction = level - below as f32;
         self.levels[below] + (self.levels[below + 1] - self.levels[below]) * fraction

@@ -25,8 +25,8 @@ pub fn is_rotation(matrix: &Matrix3<f64>) -> bool {
     error.iter().all(|entry| entry.abs() < TOLERANCE) && matrix.determinant() > 0.0
 }
 
-/// The roll of a camera that sees "down" in direction `down` of its own frame: the clockwise turn, in radians, that stands
-/// its photograph upright. 0 straight up or down.
+/// The roll of a camera that sees "down" in direction `down` of its own frame: the clockwise turn, in radians, that
+/// stands its photograph upright. 0 straight up or down.
 pub fn roll_from_down(down: &Vector3<f64>) -> f64 {
     down.x.atan2(down.y)
 }
@@ -39,7 +39,8 @@ pub fn orthonormal_complement(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64
     (first, axis.cross(&first))
 }
 
-/// The same two as columns: turns of `axis` by small angles are this times two numbers, and what a symmetric matrix M says of them is basis^T M basis.
+/// The same two as columns: turns of `axis` by small angles are this times two numbers, and what a symmetric matrix M
+/// says of them is basis^T M basis.
 pub fn tangent_basis(axis: &Vector3<f64>) -> Matrix3x2<f64> {
     let (first, second) = orthonormal_complement(axis);
     Matrix3x2::from_columns(&[first, second])

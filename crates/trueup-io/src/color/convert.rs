@@ -52,8 +52,9 @@ impl Conversion {
         }))
     }
 
-    /// Converts a photograph whose samples are light by `curve`, one that keeps what is brighter than white; alpha stays. Its profile
-    /// tells primaries alone, and the target is sRGB's. Colors that sRGB has not are brought to its border.
+    /// Converts a photograph whose samples are light by `curve`, one that keeps what is brighter than white; alpha
+    /// stays. Its profile tells primaries alone, and the target is sRGB's. Colors that sRGB has not are brought to its
+    /// border.
     ///
     /// # Errors
     /// [`Error::Input`] if the profile describes no conversion. `name` is for messages.
@@ -132,7 +133,8 @@ fn convert<T: Copy + Default + Sync>(
     Raster::from_data(raster.width(), raster.height(), channels, converted)
 }
 
-/// A photograph whose samples are light by `from`, as 16-bit samples of `to`, whose full light is `full` of that; alpha stays.
+/// A photograph whose samples are light by `from`, as 16-bit samples of `to`, whose full light is `full` of that; alpha
+/// stays.
 pub(crate) fn relit(
     photograph: &Photograph,
     from: &TransferCurve,

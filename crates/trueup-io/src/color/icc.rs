@@ -7,8 +7,8 @@ use trueup_core::color::TransferCurve;
 
 use super::sanity::{flaw_of_conversion, flaw_of_curve, flaw_of_primaries};
 
-/// Most that two spaces' primaries may differ, as CIE XYZ relative to a white of 1, and be the same for pictures: half an
-/// 8-bit level of light. Profiles of one space by different makers differ by a quarter of this.
+/// Most that two spaces' primaries may differ, as CIE XYZ relative to a white of 1, and be the same for pictures: half
+/// an 8-bit level of light. Profiles of one space by different makers differ by a quarter of this.
 const SAME_PRIMARIES: f64 = 2e-3;
 
 /// A color space given by primaries and one transfer curve: what a panorama can be composed in.

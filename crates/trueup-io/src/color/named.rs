@@ -7,13 +7,14 @@ use moxcms::{
 
 use super::icc::{RgbSpace, Understood, compact, description, understand};
 
-/// Code points of what screens show as sRGB: its primaries, unspecified ones, and its curve (ITU-T H.273, tables 2 and 3).
+/// Code points of what screens show as sRGB: its primaries, unspecified ones, and its curve (ITU-T H.273, tables 2 and
+/// 3).
 const PRIMARIES_OF_SRGB: u16 = 1;
 const UNSPECIFIED: u16 = 2;
 const CURVE_OF_SRGB: u16 = 13;
 
-/// Code points of the curves of video cameras, by which no photograph is shown: sRGB's is meant (Rec. BT.709, 601, 2020 at both
-/// depths, and unspecified).
+/// Code points of the curves of video cameras, by which no photograph is shown: sRGB's is meant (Rec. BT.709, 601, 2020
+/// at both depths, and unspecified).
 const CURVES_OF_VIDEO: [u16; 5] = [1, UNSPECIFIED, 6, 14, 15];
 
 /// Most that chromaticities may differ from sRGB's and be the same: half of their last decimal.
@@ -116,9 +117,9 @@ pub(crate) fn profile_of_chromaticities(chromaticities: Chromaticities) -> Optio
     Some(compact(profile, "the primaries of the photograph").to_vec())
 }
 
-/// The profile of samples with sRGB's curve and the primaries of another profile: of light, which no curve of that profile is applied to any
-/// more. `None` where the primaries are sRGB's, and where there are none, as in profiles of gray or of tables alone. What cannot be used stays
-/// as it is, to be told of.
+/// The profile of samples with sRGB's curve and the primaries of another profile: of light, which no curve of that
+/// profile is applied to any more. `None` where the primaries are sRGB's, and where there are none, as in profiles of
+/// gray or of tables alone. What cannot be used stays as it is, to be told of.
 pub(crate) fn profile_of_light(icc: Vec<u8>) -> Option<Vec<u8>> {
     let own = match understand(&icc) {
         Understood::Space(space) => space.profile,

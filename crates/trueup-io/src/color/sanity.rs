@@ -1,19 +1,20 @@
 //! Whether a profile that can be read says something that photographs can be in.
 //!
-//! A profile may be well formed and absurd: damaged on the way, or made by a broken program. One such among the photographs
-//! would turn all of them into something that neither people nor matching recognize, were its space chosen for all.
+//! A profile may be well formed and absurd: damaged on the way, or made by a broken program. One such among the
+//! photographs would turn all of them into something that neither people nor matching recognize, were its space chosen
+//! for all.
 
 use moxcms::{ColorProfile, Layout, WHITE_POINT_D50, Xyzd};
 use trueup_core::color::TransferCurve;
 
 use super::convert::transform;
 
-/// Light at half of the encoded range: from below that of the curve of highlights up to 10,000 cd/m2 (SMPTE ST 2084: 0.0092) to
-/// beyond that of linear light (0.5). Cameras and screens are at 0.17 to 0.29.
+/// Light at half of the encoded range: from below that of the curve of highlights up to 10,000 cd/m2 (SMPTE ST 2084:
+/// 0.0092) to beyond that of linear light (0.5). Cameras and screens are at 0.17 to 0.29.
 const MIDDLE_LIGHT: std::ops::RangeInclusive<f64> = 0.004..=0.65;
 
-/// Least factor by which light grows over a tenth of the encoded range, from a tenth on: linear light, the slowest in use, grows by
-/// 1.11 over the last. Less is a stretch of levels that all mean the same.
+/// Least factor by which light grows over a tenth of the encoded range, from a tenth on: linear light, the slowest in
+/// use, grows by 1.11 over the last. Less is a stretch of levels that all mean the same.
 const LEAST_RISE: f64 = 1.03;
 
 /// Grays that are tried.
@@ -23,13 +24,15 @@ const GRAYS: u32 = 8;
 /// make a tenth of this.
 const WHITE_TOLERANCE: f64 = 0.1;
 
-/// Where primaries may lie, as CIE XYZ relative to a white of 1. The widest space in use, ACES 2065-1, goes from -0.08 to 0.95.
+/// Where primaries may lie, as CIE XYZ relative to a white of 1. The widest space in use, ACES 2065-1, goes from -0.08
+/// to 0.95.
 const PRIMARIES: std::ops::RangeInclusive<f64> = -0.15..=1.1;
 
 /// Least determinant of the primaries; sRGB's is 0.2, and that of the narrowest screens half of it.
 const LEAST_DETERMINANT: f64 = 0.02;
 
-/// Most that a neutral color may be colored in sRGB, and by how much a brighter one may be darker, as shares of the full level.
+/// Most that a neutral color may be colored in sRGB, and by how much a brighter one may be darker, as shares of the
+/// full level.
 const MOST_CAST: f64 = 0.25;
 const MOST_FALL: f64 = 0.02;
 
@@ -63,7 +66,8 @@ pub(super) fn flaw_of_primaries([red, green, blue]: [Xyzd; 3]) -> Option<&'stati
     (!is_sane).then_some("its primaries are none that a picture has")
 }
 
-/// What is wrong with the way from RGB in `profile` to sRGB, if anything: grays have to stay about gray and in their order.
+/// What is wrong with the way from RGB in `profile` to sRGB, if anything: grays have to stay about gray and in their
+/// order.
 pub(super) fn flaw_of_conversion(profile: &ColorProfile) -> Option<String> {
     let full = f64::from(u16::MAX);
     let grays: Vec<u16> = (0..=GRAYS).flat_map(|step| [(u32::from(u16::MAX) * step / GRAYS) as u16; 3]).collect();

@@ -53,11 +53,11 @@ impl Meaning {
 impl PhotographColors {
     /// Reads what photographs say of their colors, from their headers, and chooses a space for all of them.
     ///
-    /// Where all are in one space, that is it, and nothing is converted. Otherwise it is the one with the widest gamut, so
-    /// that no photograph loses colors; of equals, that of the first photograph. Photographs that say nothing are in
-    /// sRGB, or in Adobe RGB if their EXIF names it. Spaces given by tables or by a different curve for each channel are
-    /// converted to the one chosen among the others, or to sRGB; gray has no gamut and does not take part in the choice.
-    /// A profile that cannot be understood is as good as none; a warning says so.
+    /// Where all are in one space, that is it, and nothing is converted. Otherwise it is the one with the widest gamut,
+    /// so that no photograph loses colors; of equals, that of the first photograph. Photographs that say nothing are in
+    /// sRGB, or in Adobe RGB if their EXIF names it. Spaces given by tables or by a different curve for each channel
+    /// are converted to the one chosen among the others, or to sRGB; gray has no gamut and does not take part in the
+    /// choice. A profile that cannot be understood is as good as none; a warning says so.
     pub fn survey(sources: &[SourceImage], context: &StageContext) -> Self {
         Self::surveyed(sources, None, context)
     }

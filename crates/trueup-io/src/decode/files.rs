@@ -139,22 +139,24 @@ impl FilePhotographs {
         Self { colors: Some(colors), ..self }
     }
 
-    /// The same, which hands all of them out as light of a range, 16 bits a sample, in which what is brighter than white is kept:
-    /// stacks are merged to it. Those of floating point numbers have the same [`SourceImage::light`]. A range that is not sound is none.
+    /// The same, which hands all of them out as light of a range, 16 bits a sample, in which what is brighter than
+    /// white is kept: stacks are merged to it. Those of floating point numbers have the same [`SourceImage::light`]. A
+    /// range that is not sound is none.
     #[must_use]
     pub fn in_light(self, range: Option<LightRange>) -> Self {
         let light = range.and_then(|range| Some((range, TransferCurve::light(range)?)));
         Self { light, ..self }
     }
 
-    /// The same, where photographs that are stacks are fused, or merged, by `fusion`. Without, a stack is its reference.
+    /// The same, where photographs that are stacks are fused, or merged, by `fusion`. Without, a stack is its
+    /// reference.
     #[must_use]
     pub fn fused_by(self, fusion: Arc<dyn StackFusion>) -> Self {
         Self { fusion: Some(fusion), ..self }
     }
 
-    /// Most bytes that decoding one of them takes beyond twice four channels of 8 bits: what the decoder takes, and of a stack the
-    /// other exposures and what fusing takes.
+    /// Most bytes that decoding one of them takes beyond twice four channels of 8 bits: what the decoder takes, and of
+    /// a stack the other exposures and what fusing takes.
     pub fn decoding_surplus(&self) -> usize {
         let fusing = |source: &SourceImage| stack_surplus(source, self.fusion.as_deref());
         decoding_surplus(&self.sources).saturating_add(self.sources.iter().map(fusing).max().unwrap_or(0))
@@ -196,8 +198,8 @@ impl FilePhotographs {
         }
     }
 
-    /// Photograph `index`, reduced as [`working`](super::working) does; what had to be decoded or converted for it is kept if it
-    /// fits, and so is what it was reduced to.
+    /// Photograph `index`, reduced as [`working`](super::working) does; what had to be decoded or converted for it is
+    /// kept if it fits, and so is what it was reduced to.
     ///
     /// # Errors
     /// As [`working`](super::working); [`Error::Input`] if there is no photograph `index`.
@@ -229,8 +231,8 @@ impl FilePhotographs {
         self.masks.get(index).cloned().unwrap_or_default()
     }
 
-    /// What of photograph `index` is not to be looked at: the parts that its photographer ignores, those that show the camera's carrier, and what
-    /// lies beside its outline.
+    /// What of photograph `index` is not to be looked at: the parts that its photographer ignores, those that show the
+    /// camera's carrier, and what lies beside its outline.
     pub fn not_looked_at(&self, index: usize) -> Option<Arc<Mask>> {
         let ignored = self.masks(index).ignored;
         let source = self.sources.get(index)?;

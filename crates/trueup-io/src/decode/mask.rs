@@ -11,13 +11,14 @@ use super::orientation;
 use super::photograph::photograph;
 use crate::source::{self, RejectedSource, SourceOptions};
 
-/// The share of white from which on a pixel of a mask counts as white, and the opacity from which on it counts as opaque.
+/// The share of white from which on a pixel of a mask counts as white, and the opacity from which on it counts as
+/// opaque.
 const HALF: f32 = 0.5;
 
 /// Reads a picture that marks parts of the photograph `source`: the pixels that are white and opaque, at least by half.
 ///
-/// The picture has the photograph's size as it is shown, with what lies beside it in its file. One that has the size in which a
-/// photograph with a quarter turn is stored is turned with it.
+/// The picture has the photograph's size as it is shown, with what lies beside it in its file. One that has the size in
+/// which a photograph with a quarter turn is stored is turned with it.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read or has another size; [`Error::Options`]; [`Error::Cancelled`].

@@ -15,14 +15,15 @@ use crate::metadata::header;
 
 /// Decodes a photograph in full size, upright, without what lies beside it in its file.
 ///
-/// Gray stays one channel; gray with alpha becomes RGBA; alpha that is full everywhere is left out; palettes, CMYK and one-bit photographs become RGB or gray;
-/// 16 bits a sample stay 16; floating point is taken for linear light, 1 for white, and becomes 16 bits of sRGB, what is
-/// brighter than white becoming white; with [`SourceImage::light`], 16 bits of that, in which it stays.
+/// Gray stays one channel; gray with alpha becomes RGBA; alpha that is full everywhere is left out; palettes, CMYK and
+/// one-bit photographs become RGB or gray; 16 bits a sample stay 16; floating point is taken for linear light, 1 for
+/// white, and becomes 16 bits of sRGB, what is brighter than white becoming white; with [`SourceImage::light`], 16 bits
+/// of that, in which it stays.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its pixels are damaged or incomplete (no missing part
-/// is tolerated), of an unsupported kind, or no longer of the size that was found when it was examined; [`Error::Limits`]
-/// if the memory is not to be had.
+/// is tolerated), of an unsupported kind, or no longer of the size that was found when it was examined;
+/// [`Error::Limits`] if the memory is not to be had.
 pub fn photograph(source: &SourceImage) -> Result<Photograph> {
     let picture = match stored(source)? {
         Photograph::Eight(raster) => Photograph::Eight(upright(raster, source.orientation)),
@@ -47,8 +48,8 @@ pub fn sample_bits(source: &SourceImage) -> Result<u16> {
     })
 }
 
-/// Most bytes that decoding one of these takes beyond twice four channels of 8 bits, which every decoder takes: decoders of some formats
-/// hold several planes of 32 bits. A file that cannot be read counts for nothing.
+/// Most bytes that decoding one of these takes beyond twice four channels of 8 bits, which every decoder takes:
+/// decoders of some formats hold several planes of 32 bits. A file that cannot be read counts for nothing.
 pub fn decoding_surplus(sources: &[SourceImage]) -> usize {
     let surplus = |source: &SourceImage| {
         let pixel_bytes = header::open(&source.path).map_or(0, |(mut input, format)| format.pixel_bytes(&mut input));
@@ -65,7 +66,8 @@ fn stored(source: &SourceImage) -> Result<Photograph> {
     format.pixels(source, input)
 }
 
-/// The same, made smaller by the decoder where it can do that, but of at least so many columns and rows once it is upright.
+/// The same, made smaller by the decoder where it can do that, but of at least so many columns and rows once it is
+/// upright.
 pub(super) fn stored_of_at_least(source: &SourceImage, [width, height]: [usize; 2]) -> Result<Photograph> {
     let (format, input) = opened(source)?;
     let least = if source.orientation >= 5 { [height, width] } else { [width, height] };

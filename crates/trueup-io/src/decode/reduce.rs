@@ -76,8 +76,8 @@ fn spans(length: usize, scale: f64, target_length: usize) -> Vec<Span> {
     (0..target_length).map(span).collect()
 }
 
-/// Reduces `source` by `scale` to `width` x `height` pixels from the corner (0, 0). The result is gray (from one channel)
-/// or RGB (from three, and from four with the colors multiplied by alpha), 0 to 255.
+/// Reduces `source` by `scale` to `width` x `height` pixels from the corner (0, 0). The result is gray (from one
+/// channel) or RGB (from three, and from four with the colors multiplied by alpha), 0 to 255.
 ///
 /// Columns are averaged first, whole rows at a time: that runs through memory in order and in vector registers, and
 /// leaves the rows, which do not, with the few rows that remain.
@@ -202,8 +202,8 @@ mod tests {
     }
 
     proptest! {
-        /// A ramp keeps its values under area averaging: working pixel x shows the ramp at (x + 0.5) / scale. The ramp's
-        /// pixels are steps, and a mean that begins or ends within a step is off by up to an eighth of it.
+        /// A ramp keeps its values under area averaging: working pixel x shows the ramp at (x + 0.5) / scale. The
+        /// ramp's pixels are steps, and a mean that begins or ends within a step is off by up to an eighth of it.
         #[test]
         fn geometry_has_no_shift(width in 17_usize..200, height in 1_usize..40, area in 4.0_f64..4000.0) {
             let frame = WorkingFrame::new(width, height, area);

@@ -12,10 +12,10 @@ use super::working::{rgb8, whole_size};
 /// By how much decoders make photographs smaller along each side.
 const FACTORS: [usize; 4] = [1, 2, 4, 8];
 
-/// A photograph of at most `max_pixels` pixels, upright, 8-bit RGB with its colors as they are stored. Where the format's decoder can
-/// make photographs smaller by itself, it does so first, which takes a fraction of the time and memory and less care: its pixels are
-/// only nearly the means of what they stand for, and a border may be off by a pixel. What is measured comes of
-/// [`working`](super::working).
+/// A photograph of at most `max_pixels` pixels, upright, 8-bit RGB with its colors as they are stored. Where the
+/// format's decoder can make photographs smaller by itself, it does so first, which takes a fraction of the time and
+/// memory and less care: its pixels are only nearly the means of what they stand for, and a border may be off by a
+/// pixel. What is measured comes of [`working`](super::working).
 ///
 /// # Errors
 /// As [`photograph`](super::photograph()).

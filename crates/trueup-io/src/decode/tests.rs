@@ -162,8 +162,8 @@ fn every_kind_of_jpeg_is_decoded_but_none_that_is_cut_off() {
                     assert!(level.abs_diff(60 + 30 * c as u8) <= 8, "{color:?} {progressive}: {level} of channel {c}");
                 }
             }
-            // Anywhere in the file, and just before its end.
-            // But that of one scan, of which nothing but the marker of the end is missing, or bits that fill up its last byte.
+            // Anywhere in the file, and just before its end. But that of one scan, of which nothing but the marker of
+            // the end is missing, or bits that fill up its last byte.
             let is_one_scan = !progressive;
             for cut in (16..bytes.len()).step_by(101).chain(bytes.len() - 4..bytes.len()) {
                 write(&folder, "picture.jpg", &bytes[..cut]);
@@ -305,7 +305,8 @@ fn cut_pngs_tiffs_and_webps_are_refused() {
     }
 }
 
-/// Twelve bytes end a PNG; those before them are the sum of the pixels' chunk. A file may be cut between these or within the twelve.
+/// Twelve bytes end a PNG; those before them are the sum of the pixels' chunk. A file may be cut between these or
+/// within the twelve.
 #[test]
 fn a_png_that_lacks_its_end_alone_is_read() {
     let folder = TempDir::new().expect("a temporary folder");
@@ -410,7 +411,8 @@ fn the_cache_changes_nothing_but_the_work() {
     }
 }
 
-/// A working picture is kept beside its photograph, within the same budget, for as long, and handed out to who asks the same way.
+/// A working picture is kept beside its photograph, within the same budget, for as long, and handed out to who asks the
+/// same way.
 #[test]
 fn a_working_picture_is_kept_as_long_as_its_photograph() {
     let folder = TempDir::new().expect("a temporary folder");
@@ -431,7 +433,8 @@ fn a_working_picture_is_kept_as_long_as_its_photograph() {
     }
 }
 
-/// The decoder of JPEG makes photographs smaller itself; what comes out is what area averaging makes of all pixels, nearly.
+/// The decoder of JPEG makes photographs smaller itself; what comes out is what area averaging makes of all pixels,
+/// nearly.
 #[test]
 fn small_photographs_are_nearly_the_means_of_their_pixels() {
     let folder = TempDir::new().expect("a temporary folder");

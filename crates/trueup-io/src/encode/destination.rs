@@ -10,7 +10,8 @@ use super::samples::RGBA;
 use crate::format::{SideLimit, Transparency, Writing};
 use crate::formats;
 
-/// How to write what the extension of `path` names; refuses a format that has not the depth or the background asked for.
+/// How to write what the extension of `path` names; refuses a format that has not the depth or the background asked
+/// for.
 pub(super) fn writing_to(path: &Path, options: &OutputOptions) -> Result<&'static Writing> {
     let writing = formats::writing_of(path).ok_or_else(|| {
         let what = match path.extension() {
@@ -78,9 +79,9 @@ pub(super) fn check_sides(path: &Path, limit: SideLimit, width: usize, height: u
 }
 
 impl OutputOptions {
-    /// These options with the depth decided: [`Depth::Auto`] becomes 16 where `photograph_bits`, the most bits a sample of
-    /// the photographs has, is above 8 and the format of `path` can hold it, else 8; and floating point where the format has nothing
-    /// else.
+    /// These options with the depth decided: [`Depth::Auto`] becomes 16 where `photograph_bits`, the most bits a sample
+    /// of the photographs has, is above 8 and the format of `path` can hold it, else 8; and floating point where the
+    /// format has nothing else.
     pub fn with_depth_for(&self, path: &Path, photograph_bits: u16) -> Self {
         let depths = formats::writing_of(path).map_or(&[][..], |writing| writing.depths);
         let depth = match self.depth {

@@ -5,9 +5,9 @@ use std::path::Path;
 use super::options::OutputOptions;
 use crate::formats;
 
-/// Bytes that a panorama of `width` x `height` pixels will take in `path`, a file or the files of a Deep Zoom pyramid: exact
-/// where nothing is compressed and nothing transparent, else at the low end of what photographs take. 0 for formats that are
-/// not written.
+/// Bytes that a panorama of `width` x `height` pixels will take in `path`, a file or the files of a Deep Zoom pyramid:
+/// exact where nothing is compressed and nothing transparent, else at the low end of what photographs take. 0 for
+/// formats that are not written.
 pub fn expected_bytes(path: &Path, width: usize, height: usize, options: &OutputOptions) -> u64 {
     let bytes_per_pixel = formats::writing_of(path).map_or(0.0, |writing| (writing.bytes_per_pixel)(options));
     // The cast saturates.

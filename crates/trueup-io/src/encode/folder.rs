@@ -25,12 +25,12 @@ pub struct PendingFolder {
 }
 
 impl PendingFolder {
-    /// Makes an empty folder beside `target`, whose parent folder must exist, and clears away what programs that were killed left there. What is
-    /// at `target` stays as it is.
+    /// Makes an empty folder beside `target`, whose parent folder must exist, and clears away what programs that were
+    /// killed left there. What is at `target` stays as it is.
     ///
     /// # Errors
-    /// [`Error::Input`] if `target` is a file, has no name, or its parent does not exist or takes nothing; [`Error::Io`] if
-    /// the operating system refuses.
+    /// [`Error::Input`] if `target` is a file, has no name, or its parent does not exist or takes nothing;
+    /// [`Error::Io`] if the operating system refuses.
     pub fn create(target: &Path) -> Result<Self> {
         let shown = target.display();
         // A link is followed, so that the folder behind it is replaced and not the link; this names ".", too.
@@ -107,8 +107,8 @@ fn is_unknown(error: &std::io::Error) -> bool {
     matches!(error.kind(), std::io::ErrorKind::Unsupported | std::io::ErrorKind::InvalidInput)
 }
 
-/// Moves the old folder into a second temporary one, with which it goes, and the new one to its place. A program that is killed between the two
-/// leaves the old one under that other name.
+/// Moves the old folder into a second temporary one, with which it goes, and the new one to its place. A program that
+/// is killed between the two leaves the old one under that other name.
 fn replace_in_two_steps(temporary: TempDir, target: &Path) -> std::io::Result<()> {
     let parent = temporary.path().parent().unwrap_or(Path::new("."));
     let aside = tempfile::Builder::new().prefix(PREFIX).suffix(".old").tempdir_in(parent)?;

@@ -52,9 +52,9 @@ pub fn check_labels_place(path: &Path) -> Result<()> {
 
 /// Writes labels to a PNG at `path`; returns its length in bytes.
 ///
-/// Up to 255 photographs are indices into a palette of distinct colors, of which index 0 is transparent; more are 16-bit
-/// gray. Either way the samples are the labels, and text chunks `Photograph N` hold the names. Of `metadata`, the file has the EXIF. It
-/// appears complete or not at all.
+/// Up to 255 photographs are indices into a palette of distinct colors, of which index 0 is transparent; more are
+/// 16-bit gray. Either way the samples are the labels, and text chunks `Photograph N` hold the names. Of `metadata`,
+/// the file has the EXIF. It appears complete or not at all.
 ///
 /// # Errors
 /// Those of [`write()`](super::write()), and of [`LabelMap::row`].
@@ -124,8 +124,8 @@ pub(super) fn write_map(
     Ok(())
 }
 
-/// Black, then a color for every photograph: hues a golden angle apart, so that neighbors in number differ most, in three
-/// brightnesses.
+/// Black, then a color for every photograph: hues a golden angle apart, so that neighbors in number differ most, in
+/// three brightnesses.
 fn palette(photographs: usize) -> Vec<u8> {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let color = |index: usize| {

@@ -67,8 +67,9 @@ pub fn check_layers_place(path: &Path) -> Result<()> {
 /// Writes layers to the pages of a TIFF at `path`, one layer in memory at a time; returns the file's length in bytes.
 ///
 /// Every page has alpha, the name of its layer, its number, and its place in the panorama (XPosition, YPosition at 72
-/// pixels an inch; ImageFullWidth, ImageFullLength). [`OutputOptions::layer_extent`] decides whether it is as large as the
-/// panorama. Every page has all of `metadata`, whose EXIF is to say nothing of sizes and places. The file appears complete or not at all.
+/// pixels an inch; ImageFullWidth, ImageFullLength). [`OutputOptions::layer_extent`] decides whether it is as large as
+/// the panorama. Every page has all of `metadata`, whose EXIF is to say nothing of sizes and places. The file appears
+/// complete or not at all.
 ///
 /// # Errors
 /// Those of [`write()`](crate::encode::write()), and of [`LayerSet::open`].

@@ -53,24 +53,24 @@ pub use place::{is_standard_output, passes_through, same_place};
 pub use stale::clear_parts;
 pub use unfinished::{abandon_unfinished, abandon_unfinished_soon};
 
-/// Writes a panorama to `path`, in the format its extension names; returns the file's length in bytes, for Deep Zoom that
-/// of all files.
+/// Writes a panorama to `path`, in the format its extension names; returns the file's length in bytes, for Deep Zoom
+/// that of all files.
 ///
-/// `metadata` describes the picture: its color profile, which [`OutputOptions::profile`] may have it converted from, and
-/// the EXIF and XMP to embed; Deep Zoom has none.
+/// `metadata` describes the picture: its color profile, which [`OutputOptions::profile`] may have it converted from,
+/// and the EXIF and XMP to embed; Deep Zoom has none.
 ///
 /// Rows are asked for in strips, in parallel on the current thread pool; only WebP needs a copy of the whole. JPEG is
 /// laid over the background, the other formats keep transparency unless [`OutputOptions::background`] is a color or
 /// [`OutputOptions::alpha`] says otherwise. A depth of [`Depth::Auto`] is taken for 8 bits, see
-/// [`OutputOptions::with_depth_for`]. The bytes written depend on the picture and the options alone. The file is written
-/// under another name in the same folder and renamed when it is complete, so that on any error nothing is left behind and
-/// an existing file stays as it was.
+/// [`OutputOptions::with_depth_for`]. The bytes written depend on the picture and the options alone. The file is
+/// written under another name in the same folder and renamed when it is complete, so that on any error nothing is left
+/// behind and an existing file stays as it was.
 ///
 /// # Errors
-/// [`Error::Options`] for options out of range; [`Error::Unsupported`] for other extensions, a depth that the format has
-/// not, or a transparent background where there is no transparency; [`Error::Limits`] for pictures larger than the format
-/// can hold; [`Error::Input`] for an empty picture, or a folder that does not exist or takes no files; [`Error::Io`] if the
-/// operating system refuses; [`Error::Cancelled`]; and what the picture returns.
+/// [`Error::Options`] for options out of range; [`Error::Unsupported`] for other extensions, a depth that the format
+/// has not, or a transparent background where there is no transparency; [`Error::Limits`] for pictures larger than the
+/// format can hold; [`Error::Input`] for an empty picture, or a folder that does not exist or takes no files;
+/// [`Error::Io`] if the operating system refuses; [`Error::Cancelled`]; and what the picture returns.
 pub fn write(
     path: &Path,
     picture: &dyn RowSource,
@@ -118,7 +118,8 @@ pub fn check_writable(path: &Path, options: &OutputOptions) -> Result<()> {
     }
 }
 
-/// Checks that the extension of `path` names a format that has the depth and the background asked for, wherever it lies.
+/// Checks that the extension of `path` names a format that has the depth and the background asked for, wherever it
+/// lies.
 ///
 /// # Errors
 /// [`Error::Unsupported`].
@@ -134,7 +135,8 @@ pub fn check_size(path: &Path, [width, height]: [usize; 2], options: &OutputOpti
     check_sides(path, writing_to(path, options)?.sides, width, height)
 }
 
-/// Writes a file that appears complete or not at all, also where the computer loses power; for reports and project files.
+/// Writes a file that appears complete or not at all, also where the computer loses power; for reports and project
+/// files.
 ///
 /// # Errors
 /// [`Error::Input`] if the folder does not exist or takes no files, [`Error::Io`] if the operating system refuses.
@@ -142,8 +144,8 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     write_bytes(path, bytes, Durability::Whole)
 }
 
-/// The same without waiting for the disk: a computer that loses power may leave the file empty or half. For what is looked through when it is
-/// read, and can be made again.
+/// The same without waiting for the disk: a computer that loses power may leave the file empty or half. For what is
+/// looked through when it is read, and can be made again.
 ///
 /// # Errors
 /// As [`write_atomically`].

@@ -29,7 +29,8 @@ trueup_core::choice! {
 trueup_core::choice! {
     /// Bits of a sample.
     pub enum Depth {
-        /// 16 where a photograph has more than 8 and the format can hold them, else 8; float where the format has nothing else.
+        /// 16 where a photograph has more than 8 and the format can hold them, else 8; float where the format has
+        /// nothing else.
         Auto = "auto",
         /// 8 bits.
         Eight = "8",
@@ -123,7 +124,8 @@ trueup_core::choice! {
         Keep = "keep",
         /// All but the place.
         NoLocation = "no-location",
-        /// Nothing. The color profile and the crop of a spherical panorama, which viewers need, are written all the same.
+        /// Nothing. The color profile and the crop of a spherical panorama, which viewers need, are written all the
+        /// same.
         None = "none",
     }
 }
@@ -131,14 +133,14 @@ trueup_core::choice! {
 trueup_core::options! {
     /// How panoramas are written. The format follows from the file's extension; WebP is always lossless.
     pub struct OutputOptions("output") {
-        /// Bits of a sample; JPEG, WebP and Deep Zoom have 8, OpenEXR and Radiance are float. Choose 16 or float when the panorama
-        /// is to be edited further, 8 when 16-bit photographs are to make a small file.
+        /// Bits of a sample; JPEG, WebP and Deep Zoom have 8, OpenEXR and Radiance are float. Choose 16 or float when
+        /// the panorama is to be edited further, 8 when 16-bit photographs are to make a small file.
         depth: Depth = Depth::Auto, Allowed::Any, "", basic;
-        /// Whether PNG, TIFF, WebP, OpenEXR and Deep Zoom in PNG have transparency. Drop it for programs that show it wrongly,
-        /// keep it when what a chosen background covers must still be told apart.
+        /// Whether PNG, TIFF, WebP, OpenEXR and Deep Zoom in PNG have transparency. Drop it for programs that show it
+        /// wrongly, keep it when what a chosen background covers must still be told apart.
         alpha: Alpha = Alpha::Auto, Allowed::Any, "", basic;
-        /// JPEG quality on the usual scale of the Independent JPEG Group. Raise it for prints, lower it where the file is too
-        /// large to send.
+        /// JPEG quality on the usual scale of the Independent JPEG Group. Raise it for prints, lower it where the file
+        /// is too large to send.
         jpeg_quality: u8 = 92, between(1.0, 100.0), "", basic;
         /// How finely JPEG stores color. Choose 4:4:4 when red or blue lettering and edges look frayed.
         jpeg_subsampling: ChromaSubsampling = ChromaSubsampling::Quarter, Allowed::Any, "";
@@ -146,29 +148,29 @@ trueup_core::options! {
         png_compression: PngCompression = PngCompression::Fast, Allowed::Any, "";
         /// How TIFF strips and tiles are compressed. Choose none for programs that do not read deflate, or for speed.
         tiff_compression: TiffCompression = TiffCompression::Deflate, Allowed::Any, "", basic;
-        /// How the pixels of a TIFF are cut up. Choose strips for programs that read no tiles, tiles for viewers of smaller
-        /// panoramas that read only what they show.
+        /// How the pixels of a TIFF are cut up. Choose strips for programs that read no tiles, tiles for viewers of
+        /// smaller panoramas that read only what they show.
         tiff_layout: TiffLayout = TiffLayout::Auto, Allowed::Any, "";
-        /// Whether tiled TIFFs have smaller copies (overviews, pyramid) for viewers, as pages of their own. Switch it off for
-        /// programs that take every page for a picture.
+        /// Whether tiled TIFFs have smaller copies (overviews, pyramid) for viewers, as pages of their own. Switch it
+        /// off for programs that take every page for a picture.
         tiff_overviews: bool = true, Allowed::Any, "";
         /// Whether a TIFF is a BigTIFF. Choose always for programs that expect it of every file.
         tiff_big: BigTiff = BigTiff::Auto, Allowed::Any, "";
         /// Side of Deep Zoom tiles, without what overlaps. Raise it for fewer files, where a server is slow to answer.
         dzi_tile_px: usize = 254, between(16.0, 8192.0), "px";
-        /// By how much Deep Zoom tiles reach into their neighbors. Set it to what the viewer expects; 0 if it shows tiles side
-        /// by side, more if seams show between tiles.
+        /// By how much Deep Zoom tiles reach into their neighbors. Set it to what the viewer expects; 0 if it shows
+        /// tiles side by side, more if seams show between tiles.
         dzi_overlap_px: usize = 1, between(0.0, 8.0), "px";
         /// Format of Deep Zoom tiles. Choose png where they must be lossless or transparent.
         dzi_format: DeepZoomFormat = DeepZoomFormat::Jpeg, Allowed::Any, "";
-        /// How large the pages of a file of layers are. Choose cropped for programs that heed the place of a page (GIMP,
-        /// Hugin, enblend): they then need less memory.
+        /// How large the pages of a file of layers are. Choose cropped for programs that heed the place of a page
+        /// (GIMP, Hugin, enblend): they then need less memory.
         layer_extent: LayerExtent = LayerExtent::Canvas, Allowed::Any, "";
-        /// What shows where no photograph is. A color is laid under the panorama in every format, unless alpha is kept: choose
-        /// one to match the page or print that the panorama is put on.
+        /// What shows where no photograph is. A color is laid under the panorama in every format, unless alpha is kept:
+        /// choose one to match the page or print that the panorama is put on.
         background: Background = Background::Auto, Allowed::Any, "", basic;
-        /// Which color space panoramas are written in; Deep Zoom tiles and floating point samples are in sRGB's. Choose srgb
-        /// for places that ignore profiles.
+        /// Which color space panoramas are written in; Deep Zoom tiles and floating point samples are in sRGB's. Choose
+        /// srgb for places that ignore profiles.
         profile: OutputProfile = OutputProfile::Keep, Allowed::Any, "";
         /// What panoramas tell of their photographs, in EXIF and XMP. Choose no-location or none before publishing what
         /// should not tell where or with what it was taken.

@@ -96,8 +96,8 @@ impl PendingFile {
         }
     }
 
-    /// Where what is written lies until then, as errors name it: what passes through lies in the folder for temporary files, which may
-    /// be full where the target is not.
+    /// Where what is written lies until then, as errors name it: what passes through lies in the folder for temporary
+    /// files, which may be full where the target is not.
     pub(crate) fn place(&self) -> PathBuf {
         match self.way {
             Way::Renamed { .. } => self.target.clone(),
@@ -126,7 +126,8 @@ impl PendingFile {
     }
 }
 
-/// Has the disk hold what was written to a file. Some file systems cannot be asked for that, which is no reason to have no file.
+/// Has the disk hold what was written to a file. Some file systems cannot be asked for that, which is no reason to have
+/// no file.
 fn sync(file: &File) -> std::io::Result<()> {
     match file.sync_all() {
         Err(error) if matches!(error.kind(), ErrorKind::Unsupported | ErrorKind::InvalidInput) => Ok(()),
@@ -143,9 +144,9 @@ fn folder_of(target: &Path) -> &Path {
     }
 }
 
-/// Checks that a file of any kind could be written to `path`: the folder exists and takes files, and `path` is no folder
-/// itself. Pipes and character devices are written through, disks refused. Nothing is left behind, nor what an earlier
-/// program that was killed has left in that folder.
+/// Checks that a file of any kind could be written to `path`: the folder exists and takes files, and `path` is no
+/// folder itself. Pipes and character devices are written through, disks refused. Nothing is left behind, nor what an
+/// earlier program that was killed has left in that folder.
 ///
 /// # Errors
 /// [`Error::Input`] if the folder does not exist or takes no files, [`Error::Io`] if the operating system refuses.
@@ -167,7 +168,8 @@ pub(crate) fn refuse_folder(path: &Path) -> Result<()> {
     }
 }
 
-/// Checks that a file may be called as `path` is, wherever it comes to lie: its temporary name is short, and its own is needed when all is done.
+/// Checks that a file may be called as `path` is, wherever it comes to lie: its temporary name is short, and its own is
+/// needed when all is done.
 ///
 /// # Errors
 /// [`Error::Input`] if its name, or the path, is longer than the operating system allows.
@@ -189,8 +191,8 @@ pub(super) fn require_folder(folder: &Path, shown: impl Display) -> Result<()> {
     Err(Error::input(shown, reason, "Create it or choose another folder."))
 }
 
-/// Why nothing can be made in `folder`: a disk that is full fails the program and not this one output, a folder that may not be written to is at
-/// fault itself.
+/// Why nothing can be made in `folder`: a disk that is full fails the program and not this one output, a folder that
+/// may not be written to is at fault itself.
 pub(crate) fn takes_nothing(folder: &Path, error: &std::io::Error) -> Error {
     // The name that was tried, which follows, is temporary and nobody's concern.
     let said = error.to_string();

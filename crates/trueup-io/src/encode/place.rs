@@ -13,7 +13,8 @@ pub fn is_standard_output(path: &Path) -> bool {
     path.as_os_str() == STANDARD_OUTPUT || leads_to_standard_output(path)
 }
 
-/// Whether what is written to `path` is passed on and gone, as through a pipe or a device, instead of lying there as a file.
+/// Whether what is written to `path` is passed on and gone, as through a pipe or a device, instead of lying there as a
+/// file.
 pub fn passes_through(path: &Path) -> bool {
     is_standard_output(path) || path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }

@@ -61,8 +61,8 @@ impl<'a, S: OutputSample> TileRow<'a, S> {
     }
 }
 
-/// Takes the rows of a picture from top to bottom and hands out the rows of tiles of all levels as they are complete. Holds
-/// of every level little more than one row of tiles, of all together about twice as much as of the first.
+/// Takes the rows of a picture from top to bottom and hands out the rows of tiles of all levels as they are complete.
+/// Holds of every level little more than one row of tiles, of all together about twice as much as of the first.
 ///
 /// A pixel of a copy is the mean of the four under it, weighted by alpha: of encoded values, as programs that make such
 /// pyramids do; linear light would brighten fine patterns as a camera does, but differs visibly in these only.

@@ -10,20 +10,20 @@ pub(super) const PART: &str = ".part";
 /// Younger files may be of a program that has made but not yet marked them.
 pub(super) const STALE_AGE: Duration = Duration::from_secs(60);
 
-/// Marks a temporary file as that of a living program: a lock, which goes with the program however it ends. Where the file
-/// system knows none, the file is never taken for stale either.
+/// Marks a temporary file as that of a living program: a lock, which goes with the program however it ends. Where the
+/// file system knows none, the file is never taken for stale either.
 pub(super) fn mark_in_use(file: &File) {
     drop(file.try_lock());
 }
 
-/// Takes away the temporary files in `folder` that programs which were killed left behind, once nothing was written to them for
-/// `age`: zero for a folder that nobody else writes into now. What cannot be taken away stays.
+/// Takes away the temporary files in `folder` that programs which were killed left behind, once nothing was written to
+/// them for `age`: zero for a folder that nobody else writes into now. What cannot be taken away stays.
 pub fn clear_parts(folder: &Path, age: Duration) {
     clear_stale(folder, age);
 }
 
-/// Takes away the temporary files and folders in `folder` that no living program has marked, once nothing was written to them for
-/// `age`. What cannot be looked at or taken away stays.
+/// Takes away the temporary files and folders in `folder` that no living program has marked, once nothing was written
+/// to them for `age`. What cannot be looked at or taken away stays.
 pub(super) fn clear_stale(folder: &Path, age: Duration) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {

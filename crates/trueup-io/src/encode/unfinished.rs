@@ -16,8 +16,8 @@ pub fn abandon_unfinished() {
     UNFINISHED.abandon();
 }
 
-/// The same for a program that cannot wait: what another thread is just beginning or completing is waited for no longer than a
-/// second. What it holds then stays under its temporary name, and the next program clears it away.
+/// The same for a program that cannot wait: what another thread is just beginning or completing is waited for no longer
+/// than a second. What it holds then stays under its temporary name, and the next program clears it away.
 pub fn abandon_unfinished_soon() {
     UNFINISHED.abandon_soon();
 }

@@ -34,8 +34,8 @@ impl Share for f32 {
     }
 }
 
-/// The same colors without what opacity took from them, if `is_premultiplied`; alpha is the second of two channels and the fourth of
-/// four. What is transparent has no color.
+/// The same colors without what opacity took from them, if `is_premultiplied`; alpha is the second of two channels and
+/// the fourth of four. What is transparent has no color.
 pub(crate) fn straight<S: Share>(mut samples: Vec<S>, channels: usize, is_premultiplied: bool) -> Vec<S> {
     if !is_premultiplied || !matches!(channels, 2 | 4) {
         return samples;

@@ -1,8 +1,8 @@
 //! The boxes that files of the ISO base media family are made of.
 //!
 //! # Source
-//! ISO/IEC 14496-12, section 4.2: 32 bits of length, four letters of kind, and 64 bits of length where the 32 say 1. A length of 0
-//! is that up to the end of the file.
+//! ISO/IEC 14496-12, section 4.2: 32 bits of length, four letters of kind, and 64 bits of length where the 32 say 1. A
+//! length of 0 is that up to the end of the file.
 
 use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;

@@ -51,8 +51,8 @@ pub(crate) static DEEP_ZOOM: Format = Format {
 
 /// Writes NAME.dzi and the folder NAME_files; returns the bytes of all files together.
 ///
-/// Both are made under other names and renamed when they are complete, the folder first: what the .dzi file describes is
-/// there. An older folder of tiles is replaced.
+/// Both are made under other names and renamed when they are complete, the folder first: what the .dzi file describes
+/// is there. An older folder of tiles is replaced.
 fn write(path: &Path, picture: &dyn RowSource, options: &OutputOptions, context: &StageContext<'_>) -> Result<u64> {
     let mut description = PendingFile::create(path)?;
     let folder = tiles_folder(path);

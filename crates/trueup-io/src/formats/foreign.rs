@@ -30,8 +30,8 @@ pub(crate) static VIDEO: Foreign = Foreign {
 /// The formats, the more special before the more general.
 ///
 /// # Source
-/// ISO/IEC 14496-12 and 23008-12 (boxes and their brands), ISO/IEC 15444-1 annex I (JPEG 2000); of camera raw, LibRaw's identification
-/// of makers.
+/// ISO/IEC 14496-12 and 23008-12 (boxes and their brands), ISO/IEC 15444-1 annex I (JPEG 2000); of camera raw, LibRaw's
+/// identification of makers.
 static FOREIGN: [&Foreign; 13] = [
     &RAW,
     &Foreign {
@@ -122,7 +122,8 @@ pub(super) fn has_brand(start: &[u8], brand: &[u8; 3]) -> bool {
     start.get(4..8) == Some(b"ftyp") && start.get(8..11) == Some(brand)
 }
 
-/// Whether a box of the kind `ftyp` that begins a file names, beside its brand, a compatible one that begins so, as far as can be seen.
+/// Whether a box of the kind `ftyp` that begins a file names, beside its brand, a compatible one that begins so, as far
+/// as can be seen.
 ///
 /// # Source
 /// ISO/IEC 14496-12, section 4.3: the brand, its version, and compatible brands up to the end of the box.

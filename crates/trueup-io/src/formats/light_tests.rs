@@ -61,7 +61,8 @@ fn light_of(sample: u16) -> f64 {
     if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Half a level of 16 bits where the curve is steepest, and half a part in 128: a mantissa of the brightest light, 1, has 7 bits.
+/// Half a level of 16 bits where the curve is steepest, and half a part in 128: a mantissa of the brightest light, 1,
+/// has 7 bits.
 const FINE: f64 = 0.5 * 2.3 / 65535.0;
 const COARSE: f64 = 0.5 / 128.0 + FINE;
 

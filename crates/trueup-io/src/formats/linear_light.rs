@@ -14,9 +14,10 @@ pub(crate) fn level(light: f64) -> u16 {
     (TransferCurve::SRGB.encoded(light) * FULL).round() as u16
 }
 
-/// Linear light as 16-bit samples: of a range, or without one of sRGB, with 1 for white. What is brighter than either's end is as bright as
-/// that. What is no finite number is missing: infinite light (a pixel that a division left without a weight, the sun of a rendering) is as
-/// bright as the brightest finite sample of `samples`, so that it sets no range of light; NaN is black. Alpha, the second of two channels or the fourth of four, is a share, not light.
+/// Linear light as 16-bit samples: of a range, or without one of sRGB, with 1 for white. What is brighter than either's
+/// end is as bright as that. What is no finite number is missing: infinite light (a pixel that a division left without
+/// a weight, the sun of a rendering) is as bright as the brightest finite sample of `samples`, so that it sets no range
+/// of light; NaN is black. Alpha, the second of two channels or the fourth of four, is a share, not light.
 pub(crate) fn encoded(samples: &[f32], channels: usize, range: Option<LightRange>) -> Vec<u16> {
     let curve = range.and_then(TransferCurve::light);
     let level = |light: f64| match (&curve, range) {

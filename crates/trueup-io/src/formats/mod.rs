@@ -1,7 +1,7 @@
 //! The table of file formats, and what can be asked of all of them.
 //!
-//! A format is a file here with its declaration, its reader and its writer, and a row in [`FORMATS`]; `docs/formats.md` has
-//! a row for it in each of its tables, which a test compares with the declarations.
+//! A format is a file here with its declaration, its reader and its writer, and a row in [`FORMATS`]; `docs/formats.md`
+//! has a row for it in each of its tables, which a test compares with the declarations.
 
 pub(crate) mod alpha;
 mod avif;
@@ -102,8 +102,8 @@ pub(crate) fn read_start(file: &mut impl Read) -> std::io::Result<Vec<u8>> {
     Ok(start)
 }
 
-/// How to write what the extension of `path` names, in any case. Standard output, which has none, gets PNG: without loss,
-/// with transparency, and read by every program.
+/// How to write what the extension of `path` names, in any case. Standard output, which has none, gets PNG: without
+/// loss, with transparency, and read by every program.
 pub(crate) fn writing_of(path: &Path) -> Option<&'static Writing> {
     if path.extension().is_none() && is_standard_output(path) {
         return png::PNG.writing.as_ref();

@@ -68,8 +68,9 @@ const END: &[u8] = b"\0\0\0\0IEND\xae\x42\x60\x82";
 const SIGNATURE_BYTES: u64 = 8;
 const CHUNK_BYTES: u64 = 12;
 
-/// A file with the chunk behind it that ends a PNG, or what it lacks of it. One that was cut right behind its last pixels, or within that
-/// chunk, has all of them; of one that was cut within them the chunk makes nothing whole, and of a whole file it is never read.
+/// A file with the chunk behind it that ends a PNG, or what it lacks of it. One that was cut right behind its last
+/// pixels, or within that chunk, has all of them; of one that was cut within them the chunk makes nothing whole, and of
+/// a whole file it is never read.
 struct Ended<'a> {
     input: &'a mut Input,
     /// What the file may lack of the chunk.
@@ -90,8 +91,8 @@ impl<'a> Ended<'a> {
     }
 }
 
-/// How many bytes a file has of the chunk that ends a PNG, where it was cut within it; 0 otherwise. Chunks are followed, since the sum of
-/// the one before may end as this one begins.
+/// How many bytes a file has of the chunk that ends a PNG, where it was cut within it; 0 otherwise. Chunks are
+/// followed, since the sum of the one before may end as this one begins.
 fn begun_end(input: &mut Input) -> IoResult<usize> {
     let length = input.seek(SeekFrom::End(0))?;
     let tail_start = length.saturating_sub(END.len() as u64);
@@ -143,8 +144,8 @@ impl Seek for Ended<'_> {
     }
 }
 
-/// A decoder that takes at most so many bytes beside the pixels and hands them out with 8 or 16 bits a sample, palettes as
-/// RGB. A profile, which may be a few bytes that stand for as many as there are, is read where it is wanted.
+/// A decoder that takes at most so many bytes beside the pixels and hands them out with 8 or 16 bits a sample, palettes
+/// as RGB. A profile, which may be a few bytes that stand for as many as there are, is read where it is wanted.
 fn decoder<R: BufRead + Seek>(
     input: R,
     bytes: usize,

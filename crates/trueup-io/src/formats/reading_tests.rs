@@ -1,8 +1,9 @@
 //! Files that other programs made, and what a file that was cut off says.
 //!
-//! Those in `files` were made by cjxl 0.7 and heif-enc 1.15 of [`level`]; `rotated.heic` has a property that turns it, `turned.jxl` was
-//! a JPEG with an orientation. What djxl and heif-convert of the same versions made of those with loss lies beside them, as PNG. Those in
-//! OpenEXR were made by its own library, OpenEXR 3.5, of the light of [`level`]; `tiles.exr` has the alpha of [`opacity`].
+//! Those in `files` were made by cjxl 0.7 and heif-enc 1.15 of [`level`]; `rotated.heic` has a property that turns it,
+//! `turned.jxl` was a JPEG with an orientation. What djxl and heif-convert of the same versions made of those with loss
+//! lies beside them, as PNG. Those in OpenEXR were made by its own library, OpenEXR 3.5, of the light of [`level`];
+//! `tiles.exr` has the alpha of [`opacity`].
 
 use tempfile::TempDir;
 use trueup_core::StageContext;
@@ -100,8 +101,8 @@ macro_rules! pair {
     };
 }
 
-/// The pair, samples of a pixel, bits, and most levels of difference: none but where that program rounds otherwise, or fills 10 bits up
-/// to 16 with zeros.
+/// The pair, samples of a pixel, bits, and most levels of difference: none but where that program rounds otherwise, or
+/// fills 10 bits up to 16 with zeros.
 #[test]
 fn pictures_with_loss_are_what_other_programs_make_of_them() {
     let cases: [(Pair, usize, u16, f64); 5] = [
@@ -140,10 +141,12 @@ fn opacity_is_kept() {
     }
 }
 
-/// The orientation in EXIF, a quarter turn clockwise, says the same once more in the one, and in the other something else.
+/// The orientation in EXIF, a quarter turn clockwise, says the same once more in the one, and in the other something
+/// else.
 #[test]
 fn what_the_codec_says_of_orientation_counts() {
-    // A quarter turn clockwise, and one anticlockwise: the first pixel was the first of the last row, or the last of the first.
+    // A quarter turn clockwise, and one anticlockwise: the first pixel was the first of the last row, or the last of
+    // the first.
     type Place = fn(usize, usize) -> [usize; 2];
     let turned: Place = |x, y| [y, HEIGHT - 1 - x];
     let rotated: Place = |x, y| [WIDTH - 1 - y, x];
@@ -190,7 +193,8 @@ fn color_spaces_are_named() {
     assert_eq!(space(file!("p3.heic")), ("primaries 12, transfer 13 of H.273".to_owned(), true));
 }
 
-/// The same file with another number in place of its only field of EXIF's own directory: ColorSpace, Adobe RGB by the number of cameras.
+/// The same file with another number in place of its only field of EXIF's own directory: ColorSpace, Adobe RGB by the
+/// number of cameras.
 fn in_adobe_rgb(whole: &[u8], is_big_endian: bool) -> Vec<u8> {
     // FocalLengthIn35mmFilm is 0xa405, ColorSpace 0xa001; a short, one of it.
     let [from, to]: [&[u8]; 2] = match is_big_endian {
@@ -217,7 +221,8 @@ fn files_that_name_their_colors_are_not_overruled_by_exif() {
     assert_eq!(name(&boxes), "sRGB", "always named");
 }
 
-/// A tile of 1203 x 1203 pixels of which 24 x 18 are shown: what is decoded for them is not what the picture's size says.
+/// A tile of 1203 x 1203 pixels of which 24 x 18 are shown: what is decoded for them is not what the picture's size
+/// says.
 #[test]
 fn what_is_coded_is_in_proportion_to_what_is_shown() {
     let (_folder, sources) = scanned(file!("part.heic"));

@@ -116,7 +116,8 @@ mod tests {
     fn a_profile_is_no_longer_than_a_header_may_be() {
         let of_length = |length: usize| {
             let mut file = tempfile::tempfile().expect("a file");
-            // What the whole is long, an extended header of 24 x 18 pixels with a profile (RFC 9649 2.7), and the profile.
+            // What the whole is long, an extended header of 24 x 18 pixels with a profile (RFC 9649 2.7), and the
+            // profile.
             let head = [
                 &b"RIFF"[..],
                 &(length as u32 + 30).to_le_bytes(),

@@ -39,8 +39,8 @@ const STITCHERS: [&str; 7] =
 pub(crate) struct ExifFields {
     /// Orientation, 1 to 8 where valid.
     pub(crate) orientation: Option<u32>,
-    /// The orientation that was recorded, where the file says itself how its pixels are turned, and this is not applied: gravity was recorded
-    /// before that turn.
+    /// The orientation that was recorded, where the file says itself how its pixels are turned, and this is not
+    /// applied: gravity was recorded before that turn.
     pub(crate) turned_by: Option<u32>,
     /// PixelXDimension, pixels. Tools that reduce a photograph often leave it at the original's size.
     pub(crate) pixel_width: Option<f64>,
@@ -167,7 +167,8 @@ impl ExifFields {
         Self { orientation: None, turned_by: self.orientation, ..self }
     }
 
-    /// The same without a color space: of a file that says itself what its colors are, or whose pixels are handed out in others.
+    /// The same without a color space: of a file that says itself what its colors are, or whose pixels are handed out
+    /// in others.
     pub(crate) fn without_color_space(self) -> Self {
         Self { color_space: None, interoperability: None, ..self }
     }
@@ -210,7 +211,8 @@ impl ExifFields {
         self.custom_rendered == Some(RENDERED_AS_PANORAMA) || STITCHERS.iter().any(|name| software.starts_with(name))
     }
 
-    /// Make and model in one line. A model that names its maker already ("NIKON CORPORATION", "NIKON D7000") stands alone.
+    /// Make and model in one line. A model that names its maker already ("NIKON CORPORATION", "NIKON D7000") stands
+    /// alone.
     pub(crate) fn camera_model(&self) -> Option<String> {
         let (Some(make), Some(model)) = (&self.make, &self.model) else {
             return self.model.clone().or_else(|| self.make.clone());

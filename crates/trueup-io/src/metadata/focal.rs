@@ -29,15 +29,16 @@ const SENSOR_LONG_SIDE_MM: [(&str, f64); 10] = [
     ("mx5", 5.88),
 ];
 
-/// The focal length that `exif` gives for a photograph stored as `width` x `height` pixels, if it gives a believable one.
+/// The focal length that `exif` gives for a photograph stored as `width` x `height` pixels, if it gives a believable
+/// one.
 ///
 /// In this order: the 35 mm equivalent; the lens's focal length on the sensor of a known camera; the lens's focal
 /// length on a sensor measured by the focal plane resolution. Every way gives the focal length relative to the whole
 /// frame, so a photograph that was reduced since is served as well; a cropped one is not.
 ///
 /// # Departures
-/// A known camera outranks the focal plane resolution: programs that reduce a photograph often rewrite PixelXDimension but
-/// not the resolution, and the two then describe a sensor that does not exist.
+/// A known camera outranks the focal plane resolution: programs that reduce a photograph often rewrite PixelXDimension
+/// but not the resolution, and the two then describe a sensor that does not exist.
 pub(crate) fn focal_prior(exif: &ExifFields, width: f64, height: f64) -> Option<FocalPrior> {
     let long_side = width.max(height);
     let candidates = [

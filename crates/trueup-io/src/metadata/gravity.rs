@@ -30,7 +30,8 @@ pub(crate) fn recorded_gravity(exif: &ExifFields, order: PixelOrder) -> Option<R
     Some(RecordedGravity { down, source })
 }
 
-/// Down for a camera turned by yaw, pitch and roll in that order: sin and cos of the roll share out what the pitch leaves.
+/// Down for a camera turned by yaw, pitch and roll in that order: sin and cos of the roll share out what the pitch
+/// leaves.
 fn of_pose(pose: StatedPose) -> [f64; 3] {
     let (pitch_sine, pitch_cosine) = pose.pitch_deg.to_radians().sin_cos();
     let (roll_sine, roll_cosine) = pose.roll_deg.to_radians().sin_cos();
@@ -39,9 +40,9 @@ fn of_pose(pose: StatedPose) -> [f64; 3] {
 
 /// Down by the accelerometer of Apple's telephones, for the cameras in their backs.
 ///
-/// Seen from the front, x of the vector grows to the left, y to the bottom, z into the face, and what an accelerometer at rest
-/// feels is the ground's push, upward: down is (x, -y, -z) in axes to the right, to the bottom and out of the back. The sensor's
-/// rows run from top to bottom of the upright telephone, and its first row lies on the right.
+/// Seen from the front, x of the vector grows to the left, y to the bottom, z into the face, and what an accelerometer
+/// at rest feels is the ground's push, upward: down is (x, -y, -z) in axes to the right, to the bottom and out of the
+/// back. The sensor's rows run from top to bottom of the upright telephone, and its first row lies on the right.
 fn apple(exif: &ExifFields, order: PixelOrder) -> Option<[f64; 3]> {
     let is_front = |lens: &String| lens.to_lowercase().contains("front");
     if exif.lens_model.as_ref().is_some_and(is_front) {
@@ -56,8 +57,8 @@ fn apple(exif: &ExifFields, order: PixelOrder) -> Option<[f64; 3]> {
     let PixelOrder { stored: [width, height], stated, applied } = order;
     // Where the file itself says how it is turned, both are 1, and the turn is the one that EXIF recorded.
     let turned_by = exif.turned_by.and_then(|tag| u8::try_from(tag).ok());
-    // Sensors are wider than tall: a program turned taller pixels, as the tag says that it left, or by a quarter that put the
-    // picture upright.
+    // Sensors are wider than tall: a program turned taller pixels, as the tag says that it left, or by a quarter that
+    // put the picture upright.
     let shown = match (height > width, turned_by.unwrap_or(stated)) {
         (true, tag @ 5..=8) => shown(on_sensor, tag),
         (true, _) => {
@@ -106,8 +107,8 @@ mod tests {
         assert!(found.iter().zip(expected).all(|(one, other)| (one - other).abs() < 1e-12), "{found:?}");
     }
 
-    /// A telephone held upright and level, in each of the four ways: every picture is shown with down below. At rest the
-    /// vector points up: to the top is -y, to the left +x.
+    /// A telephone held upright and level, in each of the four ways: every picture is shown with down below. At rest
+    /// the vector points up: to the top is -y, to the left +x.
     #[test]
     fn telephones_held_level_show_down_below() {
         let landscape = [4032, 3024];
@@ -117,8 +118,8 @@ mod tests {
         }
     }
 
-    /// Tilted back, so that its camera looks up by 30 degrees, the ground pushes out of the back rather than into it: down has a part
-    /// behind the camera. Dipped to the right by 30 degrees, down moves to the right in the picture.
+    /// Tilted back, so that its camera looks up by 30 degrees, the ground pushes out of the back rather than into it:
+    /// down has a part behind the camera. Dipped to the right by 30 degrees, down moves to the right in the picture.
     #[test]
     fn tilted_telephones_tell_their_angles() {
         let (sine, cosine) = 30_f64.to_radians().sin_cos();
@@ -140,7 +141,8 @@ mod tests {
         assert_close(down(vector, [4032, 3024], 1, 1), [cosine, 0.0, sine]);
     }
 
-    /// Held on its head, and tilted so far that up hardly shows in the picture: what the file turned it by is what EXIF recorded.
+    /// Held on its head, and tilted so far that up hardly shows in the picture: what the file turned it by is what EXIF
+    /// recorded.
     #[test]
     fn what_the_file_turned_itself_is_turned_as_recorded() {
         let (sine, cosine) = 50_f64.to_radians().sin_cos();
@@ -168,7 +170,8 @@ mod tests {
         assert_eq!(recorded_gravity(&front, order), None);
     }
 
-    /// A camera that looks up by 20 degrees sees the ground behind its back; turned clockwise by 30, it sees it move to the right.
+    /// A camera that looks up by 20 degrees sees the ground behind its back; turned clockwise by 30, it sees it move to
+    /// the right.
     #[test]
     fn stated_poses_turn_down() {
         let of = |pitch_deg, roll_deg| {

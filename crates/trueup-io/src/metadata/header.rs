@@ -62,8 +62,8 @@ pub(crate) fn open(path: &Path) -> Option<(Input, &'static Reading)> {
     Some((input, format))
 }
 
-/// The EXIF fields of these tags that a file has, of the picture itself. A file that cannot be read has none; damaged fields
-/// are left out.
+/// The EXIF fields of these tags that a file has, of the picture itself. A file that cannot be read has none; damaged
+/// fields are left out.
 pub(crate) fn read_fields(path: &Path, wanted: &[Tag]) -> Vec<Field> {
     let fields = open(path).and_then(|(mut input, format)| format.whole_fields(&mut input, wanted));
     fields.unwrap_or_default()

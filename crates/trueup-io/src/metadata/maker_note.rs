@@ -6,7 +6,8 @@ use super::block;
 
 /// How Apple's maker note begins: its name, its version, and the byte order of what follows.
 const APPLE: &[u8] = b"Apple iOS\0\0\x01MM";
-/// A TIFF header as long as that, whose first directory lies behind it: the offsets in the note count from the note's start.
+/// A TIFF header as long as that, whose first directory lies behind it: the offsets in the note count from the note's
+/// start.
 const TIFF_HEADER: &[u8; 14] = b"MM\0\x2a\0\0\0\x0e\0\0\0\0\0\0";
 /// AccelerationVector.
 const ACCELERATION: Tag = Tag(Context::Tiff, 0x0008);

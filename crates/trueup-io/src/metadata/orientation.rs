@@ -11,8 +11,8 @@ pub(crate) enum TagVerdict {
 
 /// Judges an orientation tag by the size of the stored pixels.
 ///
-/// Tags 5 to 8 turn the photograph by a quarter. Sensors are wider than tall and cameras store what the sensor sees, so a
-/// true quarter turn is found on pixels stored wider than tall, and makes a portrait of them. Pixels stored taller
+/// Tags 5 to 8 turn the photograph by a quarter. Sensors are wider than tall and cameras store what the sensor sees, so
+/// a true quarter turn is found on pixels stored wider than tall, and makes a portrait of them. Pixels stored taller
 /// than wide were turned by a program that left the tag behind; to obey it would lay an upright photograph on its side.
 ///
 /// PixelXDimension and PixelYDimension are no evidence: programs write the displayed size there with tag and pixels

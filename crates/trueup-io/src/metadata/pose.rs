@@ -8,7 +8,8 @@ use trueup_core::source::GravitySource;
 pub(crate) struct StatedPose {
     /// How far it looks up, degrees.
     pub(crate) pitch_deg: f64,
-    /// How far it is turned clockwise about its line of sight, so that the horizon turns counterclockwise in the picture, degrees.
+    /// How far it is turned clockwise about its line of sight, so that the horizon turns counterclockwise in the
+    /// picture, degrees.
     pub(crate) roll_deg: f64,
     /// Who states it.
     pub(crate) source: GravitySource,
@@ -17,8 +18,8 @@ pub(crate) struct StatedPose {
 /// Namespaces, and the names of pitch and roll there.
 ///
 /// # Source
-/// DJI, image metadata of its cameras (gimbal angles in the north-east-down frame, turned in the order yaw, pitch, roll); Google, Photo
-/// Sphere XMP metadata.
+/// DJI, image metadata of its cameras (gimbal angles in the north-east-down frame, turned in the order yaw, pitch,
+/// roll); Google, Photo Sphere XMP metadata.
 const STATEMENTS: [(&str, &str, &str, GravitySource); 2] = [
     ("http://www.dji.com/drone-dji/1.0/", "GimbalPitchDegree", "GimbalRollDegree", GravitySource::DjiGimbal),
     (

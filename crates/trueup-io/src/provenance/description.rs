@@ -46,7 +46,7 @@ pub struct PanoramaDescription<'a> {
     pub is_srgb: bool,
     /// Where it lies on the sphere, if viewers are to know.
     pub spherical: Option<SphericalFrame>,
-    /// How the whole sphere's middle is turned against the level world, degrees: upwards, and clockwise as a head is, so
-    /// that the horizon turns anticlockwise. Zero for a panorama that stands upright.
+    /// How the whole sphere's middle is turned against the level world, degrees: upwards, and clockwise as a head is,
+    /// so that the horizon turns anticlockwise. Zero for a panorama that stands upright.
     pub pose_deg: [f64; 2],
 }

@@ -1,7 +1,8 @@
-//! What a panorama tells of the photographs it is made of: EXIF and XMP; and what is written beside it, of its maker ([`of_part`]).
+//! What a panorama tells of the photographs it is made of: EXIF and XMP; and what is written beside it, of its maker
+//! ([`of_part`]).
 //!
-//! [`describe`] gathers it from the files. Of the reference photograph come camera, lens and exposure; the time is that of
-//! the earliest photograph, and the place the reference's, or that of the first photograph that knows it.
+//! [`describe`] gathers it from the files. Of the reference photograph come camera, lens and exposure; the time is that
+//! of the earliest photograph, and the place the reference's, or that of the first photograph that knows it.
 
 pub(crate) mod description;
 mod fields;
@@ -49,8 +50,8 @@ impl Told {
     }
 }
 
-/// When a photograph was taken by its camera's clock, as its EXIF has it: seconds since the beginning of the year 1970 in
-/// local time; `None` if it does not say.
+/// When a photograph was taken by its camera's clock, as its EXIF has it: seconds since the beginning of the year 1970
+/// in local time; `None` if it does not say.
 pub fn seconds_taken(path: &Path) -> Option<f64> {
     Moment::of(&read_fields(path, &record::read()))?.seconds()
 }
@@ -84,8 +85,8 @@ pub fn describe(panorama: &PanoramaDescription<'_>, kept: MetadataKept) -> Metad
     Metadata { exif: record::block(&fields), icc: None, xmp }
 }
 
-/// The metadata of a picture that is written beside a panorama and is none itself, but for its color profile: what it is and that this
-/// program made it, so that a later run does not take it for a photograph.
+/// The metadata of a picture that is written beside a panorama and is none itself, but for its color profile: what it
+/// is and that this program made it, so that a later run does not take it for a photograph.
 pub fn of_part(part: PanoramaPart, kept: MetadataKept) -> Metadata {
     match kept {
         MetadataKept::None => Metadata::default(),

@@ -11,8 +11,8 @@ use super::taken::Moment;
 
 /// What is kept of the reference photograph as it stands: who made it, and with what.
 ///
-/// Left out on purpose: the focal length in 35 mm film and the subject's place, which speak of another field of view; the
-/// thumbnail and the maker's notes, which speak of the photograph; identities of the one file and serial numbers.
+/// Left out on purpose: the focal length in 35 mm film and the subject's place, which speak of another field of view;
+/// the thumbnail and the maker's notes, which speak of the photograph; identities of the one file and serial numbers.
 const KEPT: [Tag; 28] = [
     Tag::Make,
     Tag::Model,
@@ -83,8 +83,8 @@ const YCBCR: [u8; 4] = [1, 2, 3, 0];
 const SRGB: u16 = 1;
 const UNCALIBRATED: u16 = 0xffff;
 
-/// The panorama's own fields, and what is kept of the photographs': `reference` and `place` are the fields of those that
-/// tell of the camera and the place.
+/// The panorama's own fields, and what is kept of the photographs': `reference` and `place` are the fields of those
+/// that tell of the camera and the place.
 pub(super) fn fields(
     panorama: &PanoramaDescription<'_>,
     reference: &[Field],

@@ -16,8 +16,8 @@ pub(super) struct Moment {
 }
 
 impl Moment {
-    /// DateTimeOriginal and what belongs to it. Dates that cannot be, such as the blanks and zeros of a camera whose clock
-    /// was never set, are none.
+    /// DateTimeOriginal and what belongs to it. Dates that cannot be, such as the blanks and zeros of a camera whose
+    /// clock was never set, are none.
     pub(super) fn of(fields: &[Field]) -> Option<Self> {
         let local = text(fields, Tag::DateTimeOriginal)?;
         let moment = Self {
@@ -58,8 +58,8 @@ impl Moment {
     /// Seconds since 1970 in local time, with their fraction.
     ///
     /// # Source
-    /// Days of the proleptic Gregorian calendar: Fliegel and Van Flandern, A Machine Algorithm for Processing Calendar Dates,
-    /// Communications of the ACM 11 (10), 1968; 2440588 is the Julian day of 1970-01-01.
+    /// Days of the proleptic Gregorian calendar: Fliegel and Van Flandern, A Machine Algorithm for Processing Calendar
+    /// Dates, Communications of the ACM 11 (10), 1968; 2440588 is the Julian day of 1970-01-01.
     pub(super) fn seconds(&self) -> Option<f64> {
         const JULIAN_1970: i64 = 2_440_588;
         let [year, month, day, hour, minute, second] = self.parts()?;

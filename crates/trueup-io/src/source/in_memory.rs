@@ -12,8 +12,8 @@ use super::rejection::Rejection;
 
 /// Photographs whose pixels a program holds, by the names that it gives them.
 ///
-/// Among the inputs, such a name stands for these pixels. They are taken as they are: upright, and in sRGB. Of camera, focal
-/// length and orientation nothing is known.
+/// Among the inputs, such a name stands for these pixels. They are taken as they are: upright, and in sRGB. Of camera,
+/// focal length and orientation nothing is known.
 #[derive(Clone, PartialEq, Eq, Default)]
 pub struct InMemory(BTreeMap<String, Arc<Photograph>>);
 

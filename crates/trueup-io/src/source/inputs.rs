@@ -59,8 +59,8 @@ pub(super) fn expand_one(input: &str) -> Vec<Candidate> {
     }
 }
 
-/// The photographs directly inside a folder. What cannot be used but was clearly meant as a photograph stays in the list,
-/// so that it is rejected by name.
+/// The photographs directly inside a folder. What cannot be used but was clearly meant as a photograph stays in the
+/// list, so that it is rejected by name.
 fn expand_folder(folder: PathBuf) -> Vec<Candidate> {
     let entries = match std::fs::read_dir(&folder) {
         Ok(entries) => entries,
@@ -113,7 +113,8 @@ fn photographs_in_natural_order(paths: impl Iterator<Item = PathBuf>) -> Vec<Can
     paths.into_iter().map(Candidate::Found).collect()
 }
 
-/// Natural order without regard to case. Ties fall back to the bytes, so that the order never depends on the file system.
+/// Natural order without regard to case. Ties fall back to the bytes, so that the order never depends on the file
+/// system.
 pub fn natural_order(a: &Path, b: &Path) -> Ordering {
     let (a_text, b_text) = (a.to_string_lossy(), b.to_string_lossy());
     natord::compare_ignore_case(&a_text, &b_text).then_with(|| a.cmp(b))

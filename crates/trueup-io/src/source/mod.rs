@@ -57,9 +57,9 @@ pub struct RejectedSource {
     pub path: PathBuf,
     /// Short name for messages, unique among the inputs.
     pub name: String,
-    /// Stable machine-readable reason in kebab case: `file-missing`, `pattern-without-match`, `folder-without-pictures`,
-    /// `folder-not-file`, `file-unreadable`, `file-empty`, `not-a-picture`, `format-unsupported`, `picture-damaged`,
-    /// `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`,
+    /// Stable machine-readable reason in kebab case: `file-missing`, `pattern-without-match`,
+    /// `folder-without-pictures`, `folder-not-file`, `file-unreadable`, `file-empty`, `not-a-picture`,
+    /// `format-unsupported`, `picture-damaged`, `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`,
     /// `panorama-of-others`, `name-of-a-file`.
     pub code: String,
     /// Why it cannot be used, without a closing full stop.
@@ -82,11 +82,12 @@ impl RejectedSource {
 
 /// Finds the photographs that `inputs` name and reads their headers.
 ///
-/// An input is a file, a folder (its photographs, not those of folders inside it, hidden files left out) or a pattern with
-/// `*`, `?`, `[...]` and `**`. A path that exists is never read as a pattern. A file is taken for what its content says,
-/// whatever its name. In folders and patterns, files that are no photographs are passed over in silence, and panoramas that
-/// this program made are left out: they are of an earlier run, of the photographs beside them. Everything else that cannot be used is listed in [`Sources::rejected`], and the good files beside it are used all the same.
-/// Of the same file given twice, or of two files with the same bytes, the first is used.
+/// An input is a file, a folder (its photographs, not those of folders inside it, hidden files left out) or a pattern
+/// with `*`, `?`, `[...]` and `**`. A path that exists is never read as a pattern. A file is taken for what its content
+/// says, whatever its name. In folders and patterns, files that are no photographs are passed over in silence, and
+/// panoramas that this program made are left out: they are of an earlier run, of the photographs beside them.
+/// Everything else that cannot be used is listed in [`Sources::rejected`], and the good files beside it are used all
+/// the same. Of the same file given twice, or of two files with the same bytes, the first is used.
 ///
 /// A stale orientation tag is reported as the note [`ORIENTATION_TAG_STALE`].
 ///
@@ -157,8 +158,8 @@ fn scan_candidates(
     Ok(sources)
 }
 
-/// The files that `inputs` name, as [`scan_with`] finds them, photographs and what is none; without a look into any but those of
-/// folders and patterns, of which panoramas that this program made are left out.
+/// The files that `inputs` name, as [`scan_with`] finds them, photographs and what is none; without a look into any but
+/// those of folders and patterns, of which panoramas that this program made are left out.
 pub fn files(inputs: &[String], in_memory: &InMemory) -> Vec<PathBuf> {
     let file = |candidate| match candidate {
         Candidate::File(path) => Some(path),
@@ -168,8 +169,8 @@ pub fn files(inputs: &[String], in_memory: &InMemory) -> Vec<PathBuf> {
     inputs::expand(inputs, in_memory).into_iter().filter_map(file).collect()
 }
 
-/// The files of camera raw that `input` names, in their order: itself, or those of a folder or pattern; of these not such as lie beside a
-/// photograph of the same name, as cameras write both.
+/// The files of camera raw that `input` names, in their order: itself, or those of a folder or pattern; of these not
+/// such as lie beside a photograph of the same name, as cameras write both.
 pub fn raw_files(input: &str) -> Vec<PathBuf> {
     let is_raw = |path: &Path| formats::foreign_file(path).is_some_and(|foreign| foreign.is_raw);
     let candidates = inputs::expand_one(input);
@@ -195,7 +196,8 @@ pub fn is_own_output(path: &Path) -> bool {
     exif_of(path).is_some_and(|exif| exif.is_by_this_program())
 }
 
-/// Whether the file at `path` says that it is a panorama, whoever made it: [`scan`] leaves it out where its folder is named.
+/// Whether the file at `path` says that it is a panorama, whoever made it: [`scan`] leaves it out where its folder is
+/// named.
 pub fn is_marked_panorama(path: &Path) -> bool {
     exif_of(path).is_some_and(|exif| exif.is_by_this_program() || exif.is_panorama_of_others())
 }

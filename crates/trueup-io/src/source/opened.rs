@@ -18,7 +18,8 @@ pub(super) const OWN_OUTPUT: &str = "own-panorama";
 /// The code of panoramas that something else made, by what the file says or by what it shows.
 pub const PANORAMA_OF_OTHERS: &str = "panorama-of-others";
 
-/// What people can do who want a panorama among the photographs. Beside those that it shows, it would be left out by what it shows.
+/// What people can do who want a panorama among the photographs. Beside those that it shows, it would be left out by
+/// what it shows.
 const NAME_ITSELF: &str = "If it is to be stitched all the same, name the file itself, and beside what it was made of its overlaps in a --graph file.";
 
 /// A picture whose header was read, and whose size is accepted.

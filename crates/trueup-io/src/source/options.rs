@@ -25,12 +25,13 @@ trueup_core::choice! {
 trueup_core::options! {
     /// Which files are accepted as photographs.
     pub struct SourceOptions("source") {
-        /// Largest photograph that is accepted; larger ones are rejected by their header, before memory is taken. Raise it if
-        /// a photograph is truly so large; lower it to protect a server.
+        /// Largest photograph that is accepted; larger ones are rejected by their header, before memory is taken. Raise
+        /// it if a photograph is truly so large; lower it to protect a server.
         max_megapixels: f64 = 300.0, between(0.001, 10_000.0), "megapixels";
         /// When the EXIF orientation tag is applied. Choose always or never if photographs lie on their side.
         trust_orientation: OrientationTrust = OrientationTrust::Auto, Allowed::Any, "", basic;
-        /// Which frames of a video are used that lie in a folder as files. Choose all if photographs are passed over that are none.
+        /// Which frames of a video are used that lie in a folder as files. Choose all if photographs are passed over
+        /// that are none.
         frames: FrameUse = FrameUse::Needed, Allowed::Any, "", basic;
     }
 }

@@ -1,6 +1,7 @@
 //! The files that a pattern matches.
 //!
-//! Patterns are those of the `glob` crate, whose own search ends the program at the first name that is not UTF-8, whether the pattern means it or not.
+//! Patterns are those of the `glob` crate, whose own search ends the program at the first name that is not UTF-8,
+//! whether the pattern means it or not.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -26,8 +27,8 @@ enum Part {
     Folders,
 }
 
-/// The paths of what a pattern matches, in any order. Folders that cannot be read hold nothing; names that are not UTF-8 are
-/// matched with the replacement character in place of what is not.
+/// The paths of what a pattern matches, in any order. Folders that cannot be read hold nothing; names that are not
+/// UTF-8 are matched with the replacement character in place of what is not.
 ///
 /// # Errors
 /// Of a pattern that is malformed.

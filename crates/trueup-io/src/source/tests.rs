@@ -228,7 +228,8 @@ fn focal_length_and_camera_come_from_exif() {
     assert!((prior.focal_px - 1814.3).abs() < 0.1, "{prior:?}");
 }
 
-/// A telephone held upright, its camera up by 30 degrees, and a drone's that looks down by 10, rolled by 20: down in the pictures as they are shown.
+/// A telephone held upright, its camera up by 30 degrees, and a drone's that looks down by 10, rolled by 20: down in
+/// the pictures as they are shown.
 #[test]
 fn gravity_comes_from_the_maker_note_and_from_xmp() {
     let mut note = b"Apple iOS\0\0\x01MM\0\x01\0\x08\0\x0a\0\0\0\x03\0\0\0\x20\0\0\0\0".to_vec();

@@ -19,8 +19,9 @@ struct Square {
     sum_px: f64,
 }
 
-/// A heat map of the alignment error: squares of the panorama in which photographs were matched, colored by how far apart the
-/// matched points land on average: blue for none, yellow for the limit of good, vermilion from the limit of fair on.
+/// A heat map of the alignment error: squares of the panorama in which photographs were matched, colored by how far
+/// apart the matched points land on average: blue for none, yellow for the limit of good, vermilion from the limit of
+/// fair on.
 ///
 /// # Errors
 /// [`trueup::Error::Input`] if the project's grids are damaged.
@@ -45,8 +46,8 @@ pub fn alignment_error(project: &Project) -> Result<String> {
     Ok(document.finish(&label))
 }
 
-/// The colors of [`alignment_error`] with the errors they stand for, in the photographs' own pixels: from none to the limit of
-/// fair.
+/// The colors of [`alignment_error`] with the errors they stand for, in the photographs' own pixels: from none to the
+/// limit of fair.
 pub fn alignment_legend(project: &Project) -> Vec<(String, f64)> {
     let [good, fair] = project.limits_apart_px();
     let errors = [0.0, good / 2.0, good, (good + fair) / 2.0, fair];

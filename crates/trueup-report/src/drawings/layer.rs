@@ -73,8 +73,8 @@ impl Layer {
         }
     }
 
-    /// The drawing over the panorama of `project`, as SVG; `shown` is which photograph it shows where. `None` if there is nothing to
-    /// draw: seams where photographs are averaged, lines and errors where none were measured.
+    /// The drawing over the panorama of `project`, as SVG; `shown` is which photograph it shows where. `None` if there
+    /// is nothing to draw: seams where photographs are averaged, lines and errors where none were measured.
     ///
     /// # Errors
     /// [`trueup::Error::Input`] if the project's grids are damaged.

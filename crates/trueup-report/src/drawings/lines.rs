@@ -59,7 +59,8 @@ impl LineDirection {
     }
 }
 
-/// What each of a photograph's three vanishing directions is in the scene. `None` without vanishing directions or a rotation.
+/// What each of a photograph's three vanishing directions is in the scene. `None` without vanishing directions or a
+/// rotation.
 fn directions(image: &ImageRecord, dominant: Option<&[[f64; 3]; 3]>) -> Option<[LineDirection; 3]> {
     let level_from_camera = matrix_from_rows(image.rotation.as_ref()?).transpose();
     let found = image.vanishing_points?.map(|direction| level_from_camera * Vector3::from(direction));
@@ -89,8 +90,8 @@ fn direction_of(line: &MeasuredLine, directions: Option<[LineDirection; 3]>) -> 
     known.unwrap_or(LineDirection::Other)
 }
 
-/// The long lines of the photograph at `position` of [`Project::images`], colored by the direction they point to, and where
-/// upright is in its middle, with its interval of 95 %. The `viewBox` is the photograph in its own pixels.
+/// The long lines of the photograph at `position` of [`Project::images`], colored by the direction they point to, and
+/// where upright is in its middle, with its interval of 95 %. The `viewBox` is the photograph in its own pixels.
 pub fn lines_of_photograph(project: &Project, position: usize) -> Option<String> {
     let image = project.images.get(position)?;
     let measures = measures_of(project, image)?;
@@ -129,8 +130,8 @@ fn draw_plumb_line(document: &mut Document, image: &ImageRecord, measures: &Phot
     document.stroke(&line, &Stroke { color: "#ffffff", width: THIN_PX, dashes: "" });
 }
 
-/// The long lines of all photographs where the panorama shows them, colored by the direction they point to; those that are
-/// bent there are thick.
+/// The long lines of all photographs where the panorama shows them, colored by the direction they point to; those that
+/// are bent there are thick.
 ///
 /// # Errors
 /// [`trueup::Error::Input`] if the project's grids are damaged.

@@ -9,8 +9,8 @@ use crate::text::counted;
 /// Size of counts, relative to the photographs' numbers.
 const COUNTS: f64 = 0.8;
 
-/// The graph of overlaps over the panorama: photographs in their places with their numbers, joined where matches agree, with
-/// their count; the more there are, the thicker the line.
+/// The graph of overlaps over the panorama: photographs in their places with their numbers, joined where matches agree,
+/// with their count; the more there are, the thicker the line.
 ///
 /// # Errors
 /// [`trueup::Error::Input`] if the project's grids are damaged.

@@ -7,8 +7,8 @@ use super::palette::photograph_color;
 use super::svg::{Document, Stroke, letters_px, middle, path, placed};
 use crate::text::counted;
 
-/// The border of every photograph on the panorama, in its color, with its number in its middle: its place among all that were
-/// given, counted from 1.
+/// The border of every photograph on the panorama, in its color, with its number in its middle: its place among all
+/// that were given, counted from 1.
 ///
 /// # Errors
 /// [`trueup::Error::Input`] if the project's grids are damaged.

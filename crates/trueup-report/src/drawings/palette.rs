@@ -1,4 +1,5 @@
-//! Colors that the color-blind can tell apart (Okabe and Ito, Color Universal Design, 2008), over pictures of any color.
+//! Colors that the color-blind can tell apart (Okabe and Ito, Color Universal Design, 2008), over pictures of any
+//! color.
 
 /// Colors of photographs, one after the other.
 const PHOTOGRAPHS: [&str; 7] = ["#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"];

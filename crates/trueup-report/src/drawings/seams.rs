@@ -7,8 +7,8 @@ use trueup::ShownPhotographs;
 use super::palette::photograph_color;
 use super::svg::{Document, Stroke};
 
-/// The seams of a panorama, and a tint of each photograph's color over what is shown of it. The `viewBox` is the raster of
-/// `shown`, over the whole canvas.
+/// The seams of a panorama, and a tint of each photograph's color over what is shown of it. The `viewBox` is the raster
+/// of `shown`, over the whole canvas.
 pub fn seams(shown: &ShownPhotographs) -> String {
     let mut positions: Vec<usize> = shown.positions.iter().flatten().copied().collect();
     positions.sort_unstable();
@@ -25,8 +25,8 @@ pub fn seams(shown: &ShownPhotographs) -> String {
     document.finish(&label)
 }
 
-/// The edges between pixels that show different photographs, joined along rows and columns; the border of the picture and of
-/// what is empty is none.
+/// The edges between pixels that show different photographs, joined along rows and columns; the border of the picture
+/// and of what is empty is none.
 fn border(shown: &ShownPhotographs) -> String {
     let at = |x: usize, y: usize| shown.positions[y * shown.width + x];
     let differ = |one: Option<usize>, other: Option<usize>| one.is_some() && other.is_some() && one != other;

@@ -78,8 +78,8 @@ impl Document {
         )
     }
 
-    /// The same with what was drawn on a canvas that goes all the way round drawn again a turn to either side: what runs
-    /// beyond one end shows at the other.
+    /// The same with what was drawn on a canvas that goes all the way round drawn again a turn to either side: what
+    /// runs beyond one end shows at the other.
     pub(super) fn finish_around(mut self, canvas: Canvas, label: &str) -> String {
         if let Some(period) = canvas.period() {
             let once = self.drawn.clone();
@@ -97,8 +97,8 @@ pub(super) fn placed(project: &Project) -> Result<Vec<(usize, &ImageRecord, Grid
     used.map(|position| Ok((position, &project.images[position], project.images[position].grid()?))).collect()
 }
 
-/// The data of a path through points, broken where one is no place or lies half a canvas from the last: cells around a pole
-/// are torn.
+/// The data of a path through points, broken where one is no place or lies half a canvas from the last: cells around a
+/// pole are torn.
 pub(super) fn path(points: impl IntoIterator<Item = [f64; 2]>, canvas_width: usize) -> String {
     let mut data = String::new();
     let mut last: Option<[f64; 2]> = None;

@@ -1,5 +1,5 @@
-//! The page of a panorama: one HTML file that loads nothing and runs nothing. What it says stands in `page.html`, whose values
-//! are escaped; the files here tell it the figures.
+//! The page of a panorama: one HTML file that loads nothing and runs nothing. What it says stands in `page.html`, whose
+//! values are escaped; the files here tell it the figures.
 
 mod alignment;
 mod figures;

@@ -1,5 +1,5 @@
-//! What the page may ask for. Photographs, masks, tiles and exports go by their numbers: no request names a path, but for the
-//! folders inside the one opened, which [`Folder::inside`](crate::folder::Folder::inside) looks at.
+//! What the page may ask for. Photographs, masks, tiles and exports go by their numbers: no request names a path, but
+//! for the folders inside the one opened, which [`Folder::inside`](crate::folder::Folder::inside) looks at.
 
 mod photographs;
 mod pictures;

@@ -148,7 +148,8 @@ async fn small(State(studio): State<Arc<Studio>>, Path(number): Path<usize>, pix
     Ok((size, [(header::CONTENT_TYPE, "image/jpeg")], bytes).into_response())
 }
 
-/// What a photograph made small is called: by its file as it lies on the disk now, so that it is made once, and anew when that changes.
+/// What a photograph made small is called: by its file as it lies on the disk now, so that it is made once, and anew
+/// when that changes.
 fn name_of_small(path: &std::path::Path, pixels: f64) -> String {
     let facts = std::fs::metadata(path).ok();
     let stamp = facts.map(|facts| (facts.len(), facts.modified().ok()));
@@ -225,7 +226,8 @@ mod tests {
         entries.filter(|entry| entry.as_ref().expect("readable").path().is_dir()).count()
     }
 
-    /// Tiles and files to fetch that nothing leads to any more are removed: when another panorama is stitched, and when another folder is opened.
+    /// Tiles and files to fetch that nothing leads to any more are removed: when another panorama is stitched, and when
+    /// another folder is opened.
     #[test]
     fn what_is_no_longer_shown_is_removed() {
         let desk = tempfile::tempdir().expect("a folder");

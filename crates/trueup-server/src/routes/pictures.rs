@@ -72,8 +72,9 @@ async fn draw(underlay: Option<Arc<Underlay>>, layer: &str) -> Result<Json<ToldL
     Ok(Json(told.await.map_err(Denial::failure)??))
 }
 
-/// Begins to cut the whole panorama into tiles, or leaves it (no content) while anything else is being done: the page asks for
-/// tiles by itself, and cannot know what a person begins at the same moment, so that this is no mistake of anybody's.
+/// Begins to cut the whole panorama into tiles, or leaves it (no content) while anything else is being done: the page
+/// asks for tiles by itself, and cannot know what a person begins at the same moment, so that this is no mistake of
+/// anybody's.
 pub(crate) async fn cut(State(studio): State<Arc<Studio>>) -> StatusCode {
     match work::start(&studio, Task::Tiles, making::cut_tiles) {
         Ok(()) => StatusCode::ACCEPTED,

@@ -28,7 +28,8 @@ impl History {
         &self.steps[self.now]
     }
 
-    /// Goes on to other wishes; those that were undone are gone. Of more than [`MAX_STEPS`] steps, the first are forgotten.
+    /// Goes on to other wishes; those that were undone are gone. Of more than [`MAX_STEPS`] steps, the first are
+    /// forgotten.
     pub(crate) fn go_on(&mut self, wishes: Wishes) {
         if wishes == *self.now() {
             return;

@@ -1,7 +1,7 @@
 //! What one person works on: their photographs, what they wish of the panorama, and what was made so far.
 //!
-//! All of it is behind one lock, which nobody holds while anything takes time. Whoever changes it tells the page by a number
-//! that grows.
+//! All of it is behind one lock, which nobody holds while anything takes time. Whoever changes it tells the page by a
+//! number that grows.
 
 mod history;
 mod listed;
@@ -195,8 +195,9 @@ impl Studio {
         self.desk.path().join(Self::DROPPED)
     }
 
-    /// Where a photograph of this name is to lie that is dropped: in the first folder there that has none. Older ones of its name stay, which
-    /// the list has forgotten; those that are dropped together lie together, by which frames of a video are known.
+    /// Where a photograph of this name is to lie that is dropped: in the first folder there that has none. Older ones
+    /// of its name stay, which the list has forgotten; those that are dropped together lie together, by which frames of
+    /// a video are known.
     pub(crate) fn place_of_dropped(&self, name: &str) -> PathBuf {
         let mut folder = 0_u64;
         loop {

@@ -8,8 +8,8 @@ use trueup::{MaskFile, MaskKind, OptionDescription, StitchOptions, Tier};
 
 use super::listed::Listed;
 
-/// Masks of one photograph. The page shows the last of a kind, and paints on that; those of a project that was opened may be more, which count
-/// together.
+/// Masks of one photograph. The page shows the last of a kind, and paints on that; those of a project that was opened
+/// may be more, which count together.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct PaintedMasks {
     /// What is black in it is ignored.
@@ -99,8 +99,8 @@ pub(crate) struct Offered {
     pub phase: trueup::Phase,
 }
 
-/// The options that the page offers: those that people have a reason to change for a panorama of their own, but none of how
-/// much of the machine is taken, or where files lie.
+/// The options that the page offers: those that people have a reason to change for a panorama of their own, but none of
+/// how much of the machine is taken, or where files lie.
 pub(crate) fn offered() -> Vec<Offered> {
     let phases: BTreeMap<&str, trueup::Phase> =
         StitchOptions::tables().into_iter().filter_map(|(table, phase)| Some((table, phase?))).collect();

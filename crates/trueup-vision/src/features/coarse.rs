@@ -7,18 +7,19 @@ use super::feature::{FeaturePoint, Features};
 use super::options::FeatureOptions;
 use crate::gray::halved;
 
-/// The features of a photograph at half its size, in its own pixels; `fine` are those at its own, of which what surrounds them is looked at.
+/// The features of a photograph at half its size, in its own pixels; `fine` are those at its own, of which what
+/// surrounds them is looked at.
 ///
-/// Features are kept by strength. What sharpening makes of noise is fine and strong, and leaves no room for the coarse features that a blurred
-/// photograph shares with others; at half the size it is gone. Where few features are found there, the half is searched doubled, as [`detect`] does:
-/// of 11 cut sets with blurred photographs 71 of 72 are joined so, 70 without, and those of three photographs meet to 0.09 to 0.17 px instead of 0.26 to
-/// 0.30.
+/// Features are kept by strength. What sharpening makes of noise is fine and strong, and leaves no room for the coarse
+/// features that a blurred photograph shares with others; at half the size it is gone. Where few features are found
+/// there, the half is searched doubled, as [`detect`] does: of 11 cut sets with blurred photographs 71 of 72 are joined
+/// so, 70 without, and those of three photographs meet to 0.09 to 0.17 px instead of 0.26 to 0.30.
 ///
 /// # Errors
 /// Those of [`detect`].
 pub fn detect_coarse(fine: &Features, options: &FeatureOptions, context: &StageContext) -> Result<Features> {
-    // Means are blurred by half a sample, which is what a search for features assumes: by half a sample of the picture itself, by 0.7 as what surrounds features,
-    // and by 0.5 as means, 1.0 of the picture's samples in all.
+    // Means are blurred by half a sample, which is what a search for features assumes: by half a sample of the picture
+    // itself, by 0.7 as what surrounds features, and by 0.5 as means, 1.0 of the picture's samples in all.
     let half = halved(&fine.surroundings);
     let found = detect(&half, options, context)?;
     let in_own_pixels = |point: FeaturePoint| FeaturePoint {

@@ -33,8 +33,8 @@ pub struct Features {
     pub descriptors: Vec<Descriptor>,
     /// For every descriptor, the index of its point.
     pub descriptor_points: Vec<u32>,
-    /// The picture they were found in, gray and a little smoothed, by which matches are placed more exactly than points are found; empty where it is
-    /// not known.
+    /// The picture they were found in, gray and a little smoothed, by which matches are placed more exactly than points
+    /// are found; empty where it is not known.
     pub surroundings: Raster<u8>,
 }
 
@@ -59,8 +59,8 @@ impl Features {
         kept
     }
 
-    /// Checks that descriptors and points fit together and their surroundings are gray, so that no index is out of range later. `photograph` is the
-    /// index by which an error names their photograph.
+    /// Checks that descriptors and points fit together and their surroundings are gray, so that no index is out of
+    /// range later. `photograph` is the index by which an error names their photograph.
     ///
     /// # Errors
     /// [`Error::Input`] if they do not, if positions are not finite, or if what surrounds them is not gray.

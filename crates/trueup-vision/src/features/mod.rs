@@ -46,9 +46,9 @@ const NEIGHBOR_ROWS: usize = 16;
 
 /// Finds and describes the features of a photograph.
 ///
-/// `picture` has one channel of 0 to 255. A photograph too small or too flat has no features; one in which few are found is
-/// searched again at double size. The result is the same for any number of threads and every vector width; only the
-/// system's sine and cosine may differ between machines, in the last bit.
+/// `picture` has one channel of 0 to 255. A photograph too small or too flat has no features; one in which few are
+/// found is searched again at double size. The result is the same for any number of threads and every vector width;
+/// only the system's sine and cosine may differ between machines, in the last bit.
 ///
 /// # Errors
 /// [`Error::Options`] for options out of range, [`Error::Input`] for a photograph of several channels,

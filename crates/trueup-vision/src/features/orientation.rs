@@ -33,8 +33,8 @@ const CORNERS: usize = GRID + 1;
 /// Lowe 2004, section 5.
 ///
 /// # Departures
-/// Lowe takes the gradients of all pixels in the window. Here they are taken on a grid of [`GRID`] x [`GRID`] cells that
-/// is centered on the point and 0.5625 times the blur apart, as for the descriptor. The histogram is smoothed.
+/// Lowe takes the gradients of all pixels in the window. Here they are taken on a grid of [`GRID`] x [`GRID`] cells
+/// that is centered on the point and 0.5625 times the blur apart, as for the descriptor. The histogram is smoothed.
 pub(super) struct Orientations<'a> {
     pub(super) plane: &'a BlurredPlane,
     /// Position (x, y) in samples.

@@ -7,7 +7,8 @@ use trueup_core::{Error, Result};
 
 use super::feature::Features;
 
-/// The features of photographs that are numbered from 0, wherever they are kept: in memory, or where there is more room.
+/// The features of photographs that are numbered from 0, wherever they are kept: in memory, or where there is more
+/// room.
 pub trait FeatureSource: Debug + Sync {
     /// How many photographs there are.
     fn photographs(&self) -> usize;

@@ -5,8 +5,9 @@ use trueup_core::raster::Raster;
 /// Shares of a sample and its two neighbors, in quarters.
 const WEIGHTS: [f32; 3] = [1.0, 2.0, 1.0];
 
-/// The picture in eight bits, smoothed by a quarter, a half and a quarter along both axes: little enough to keep what tells a place, and enough
-/// that what lies between samples is nearly linear. Beyond its border, it goes on as at the border.
+/// The picture in eight bits, smoothed by a quarter, a half and a quarter along both axes: little enough to keep what
+/// tells a place, and enough that what lies between samples is nearly linear. Beyond its border, it goes on as at the
+/// border.
 pub(super) fn smoothed(picture: &Raster<f32>) -> Raster<u8> {
     let (width, height) = (picture.width(), picture.height());
     let mut smooth = Raster::new(width, height, 1);

@@ -1,7 +1,7 @@
 //! Line segments of two photographs that show the same edge.
 //!
-//! A transfer between the photographs says where a segment should be; what lies along both sides of it, which of several
-//! parallel ones it is.
+//! A transfer between the photographs says where a segment should be; what lies along both sides of it, which of
+//! several parallel ones it is.
 //!
 //! # Source
 //! The guided line matching of dual-feature warping (Li and others, ICCV 2015), reconstructed.

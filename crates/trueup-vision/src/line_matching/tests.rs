@@ -39,8 +39,8 @@ fn planks(shift: f64, gain: f64, bias: f64) -> (Raster<u8>, Vec<LineSegment>) {
     (gray, lines)
 }
 
-/// Edges of the second photograph lie 60 px to the left of those of the first; the transfer is wrong by 4 px, which brings
-/// many wrong edges as near as the right one.
+/// Edges of the second photograph lie 60 px to the left of those of the first; the transfer is wrong by 4 px, which
+/// brings many wrong edges as near as the right one.
 #[test]
 fn nearly_every_edge_finds_itself_and_hardly_any_another() {
     let (gray_a, lines_a) = planks(0.0, 1.0, 0.0);

@@ -1,8 +1,8 @@
 //! Follows the edges under segments beyond their ends, bent as they may be.
 //!
-//! Behind a lens that bends, a detector of straight segments cuts a long edge into pieces. Each piece says where the edge
-//! is and which way it rises; from there it is followed on both sides, as long as edge points go on where the last ones
-//! lead.
+//! Behind a lens that bends, a detector of straight segments cuts a long edge into pieces. Each piece says where the
+//! edge is and which way it rises; from there it is followed on both sides, as long as edge points go on where the last
+//! ones lead.
 
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::lines::{EdgeCurve, LineSegment};
@@ -245,8 +245,8 @@ mod tests {
     use super::*;
     use crate::lines::{LineOptions, detect};
 
-    /// A bright half plane beyond the parabola y = 150 + x^2 / 4000 about the middle, as a barrel bends an edge: 10 px at the
-    /// ends. It is one curve from end to end, off by a few hundredths of a pixel.
+    /// A bright half plane beyond the parabola y = 150 + x^2 / 4000 about the middle, as a barrel bends an edge: 10 px
+    /// at the ends. It is one curve from end to end, off by a few hundredths of a pixel.
     #[test]
     fn a_bent_edge_is_one_curve() {
         let parabola = |x: f64| 150.0 + (x - 200.0).powi(2) / 4000.0;

@@ -10,7 +10,8 @@ const REDUCTION: f64 = 0.8;
 /// Factor from the reduced picture's coordinates to the picture's.
 pub(super) const PICTURE_FROM_FIELD: f64 = 1.0 / REDUCTION;
 
-/// Standard deviation of the Gaussian that goes with the reduction, in pixels of the reduced picture (IPOL, section 2.1).
+/// Standard deviation of the Gaussian that goes with the reduction, in pixels of the reduced picture (IPOL, section
+/// 2.1).
 const SIGMA_REDUCED_PX: f64 = 0.6;
 
 /// Bound on the error of a gray level by quantization, in levels of 0 to 255 (IPOL, section 2.2). Pixels whose gradient
@@ -128,8 +129,8 @@ impl GradientField {
         PointMass { x: f64::from(index % stride), y: f64::from(index / stride), mass }
     }
 
-    /// The elements that have a level line, those of the largest magnitude first, in [`MAGNITUDE_CLASSES`] classes; row by
-    /// row inside a class (IPOL, section 2.3).
+    /// The elements that have a level line, those of the largest magnitude first, in [`MAGNITUDE_CLASSES`] classes; row
+    /// by row inside a class (IPOL, section 2.3).
     pub(super) fn seeds(&self) -> Vec<u32> {
         const LAST_CLASS: usize = MAGNITUDE_CLASSES - 1;
         let largest = self.magnitudes.iter().copied().fold(0.0_f32, f32::max);

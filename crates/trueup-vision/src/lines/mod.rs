@@ -1,10 +1,10 @@
 //! Straight line segments: our own LSD (Line Segment Detector) with a sub-pixel refinement of their directions.
 //!
 //! The steps, a file each: `gradient` reduces the photograph and finds level-line directions, `region` grows connected
-//! pixels of one direction, `rectangle` fits and improves rectangles, `significance` counts false alarms,
-//! `refine` fits the segment again to sub-pixel edge points of the photograph itself, `tidy` drops frame artifacts,
-//! sorts and, for those who ask, merges. `curves` follows the edges under the segments beyond their ends, bent as a lens
-//! may have made them.
+//! pixels of one direction, `rectangle` fits and improves rectangles, `significance` counts false alarms, `refine` fits
+//! the segment again to sub-pixel edge points of the photograph itself, `tidy` drops frame artifacts, sorts and, for
+//! those who ask, merges. `curves` follows the edges under the segments beyond their ends, bent as a lens may have made
+//! them.
 //!
 //! # Source
 //! R. Grompone von Gioi, J. Jakubowicz, J.-M. Morel, G. Randall, "LSD: A Fast Line Segment Detector with a False
@@ -45,13 +45,14 @@ pub use tidy::merged;
 trueup_core::options! {
     /// How line segments are found.
     pub struct LineOptions("lines") {
-        /// Segments shorter than this are dropped. Raise it where foliage, gravel or fabric gives so many short segments that
-        /// the vertical or the horizon is not found.
+        /// Segments shorter than this are dropped. Raise it where foliage, gravel or fabric gives so many short
+        /// segments that the vertical or the horizon is not found.
         min_length_px: f64 = 0.0, between(0.0, 1e6), "working px";
     }
 }
 
-/// Smallest -log10 of the number of false alarms a segment may have: one false segment a photograph (IPOL, section 2.7).
+/// Smallest -log10 of the number of false alarms a segment may have: one false segment a photograph (IPOL, section
+/// 2.7).
 const MIN_SIGNIFICANCE: f64 = 0.0;
 
 /// Segments shorter than this are not refined, in pixels: too few edge points.
@@ -88,18 +89,18 @@ pub fn detect(picture: &Raster<f32>, options: &LineOptions, context: &StageConte
     Ok(tidy::longest_first(segments, options.min_length_px, MAX_SEGMENTS))
 }
 
-/// The edges under `segments` of this picture, longest first, followed as far as they go on smoothly: straight lines of the
-/// scene, as a lens may have bent them, and whatever else is long and smooth.
+/// The edges under `segments` of this picture, longest first, followed as far as they go on smoothly: straight lines of
+/// the scene, as a lens may have bent them, and whatever else is long and smooth.
 ///
 /// # Source
-/// Edge points are those of the refinement of segments. That straight lines tell what a lens bends: D. C. Brown, "Close-range
-/// camera calibration", Photogrammetric Engineering 37(8), 1971. How they are followed is ours.
+/// Edge points are those of the refinement of segments. That straight lines tell what a lens bends: D. C. Brown,
+/// "Close-range camera calibration", Photogrammetric Engineering 37(8), 1971. How they are followed is ours.
 pub fn edge_curves(picture: &Raster<f32>, segments: &[LineSegment]) -> Vec<EdgeCurve> {
     curves::follow(picture, segments)
 }
 
-/// As [`detect`], but with the segments along the border: for a picture that was cut out of a larger one, whose border is
-/// no frame.
+/// As [`detect`], but with the segments along the border: for a picture that was cut out of a larger one, whose border
+/// is no frame.
 ///
 /// # Errors
 /// As [`detect`].

@@ -148,8 +148,8 @@ impl LineSupportRectangle {
 struct Sides {
     /// The rectangle's center.
     center: [f64; 2],
-    /// Of a pixel `dx` columns and `dy` rows from the center, `dx factor + dy other` lies along the rectangle, and then across it, within a
-    /// range.
+    /// Of a pixel `dx` columns and `dy` rows from the center, `dx factor + dy other` lies along the rectangle, and then
+    /// across it, within a range.
     bounds: [Bound; 2],
 }
 

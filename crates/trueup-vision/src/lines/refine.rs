@@ -38,7 +38,8 @@ const SEARCH_PX: [f64; 2] = [2.0, 1.0];
 /// Rounds of the reweighted fit.
 const FIT_ROUNDS: usize = 5;
 
-/// Residuals beyond this many robust standard deviations lose influence (Tukey's biweight constant for 95 % efficiency).
+/// Residuals beyond this many robust standard deviations lose influence (Tukey's biweight constant for 95 %
+/// efficiency).
 const TUKEY_SIGMAS: f64 = 4.685;
 
 /// Robust standard deviations are not taken to be smaller than this, in pixels.
@@ -336,7 +337,8 @@ fn weighted_line(points: &[EdgePoint], fit: &Fit, cutoff: f64) -> Option<Fit> {
 mod tests {
     use super::*;
 
-    /// Edges straight down a photograph, so that every row sees the same phase: `blur_px` wide, of any sub-pixel position.
+    /// Edges straight down a photograph, so that every row sees the same phase: `blur_px` wide, of any sub-pixel
+    /// position.
     fn position_error(blur_px: f64, phase: f64) -> f64 {
         const SUBSAMPLES: usize = 200;
         let edge = 12.0 + phase;

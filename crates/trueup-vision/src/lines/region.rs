@@ -6,7 +6,8 @@ use super::rectangle::{LineSupportRectangle, is_aligned};
 /// The smallest region a rectangle can be fitted to.
 const MIN_REGION: usize = 2;
 
-/// Smallest share of a rectangle's area that its region must fill; sparser regions bend and are cut (IPOL, section 2.6).
+/// Smallest share of a rectangle's area that its region must fill; sparser regions bend and are cut (IPOL, section
+/// 2.6).
 const MIN_DENSITY: f64 = 0.7;
 
 /// What a step of the reduction of a sparse region leaves of its radius (IPOL, section 2.6).
@@ -78,7 +79,8 @@ impl<'a> RegionGrower<'a> {
         LineSupportRectangle::around(&self.pixels, self.sum.map(f64::from))
     }
 
-    /// Adds 8-connected pixels, within the angle of the tangent given of the region's mean direction, until there are none.
+    /// Adds 8-connected pixels, within the angle of the tangent given of the region's mean direction, until there are
+    /// none.
     ///
     /// # Source
     /// IPOL, section 2.4.

@@ -2,7 +2,8 @@
 
 use std::f64::consts::{LN_10, PI, TAU};
 
-/// Number of precisions a rectangle is tried with, each half of the one before: the factor gamma of the number of tests (IPOL, section 2.7).
+/// Number of precisions a rectangle is tried with, each half of the one before: the factor gamma of the number of tests
+/// (IPOL, section 2.7).
 const PRECISIONS_TESTED: usize = 11;
 
 /// Factorials kept in a table; above, Stirling's series is exact to double precision.

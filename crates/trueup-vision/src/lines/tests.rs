@@ -262,8 +262,8 @@ fn quarter_turn(picture: &Raster<f32>) -> Raster<f32> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Where the edge goes, the segment goes: any direction, any sub-pixel position. One in some thousand is off by a little more than 0.03
-    /// degrees, a twentieth of a pixel over its length.
+    /// Where the edge goes, the segment goes: any direction, any sub-pixel position. One in some thousand is off by a
+    /// little more than 0.03 degrees, a twentieth of a pixel over its length.
     #[test]
     fn segments_follow_the_edge(angle in 0.0..std::f64::consts::TAU, x in 45.0..55.0, y in 45.0..55.0) {
         let segments = found(&half_plane(100, [x, y], angle));

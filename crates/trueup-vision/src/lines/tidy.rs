@@ -2,8 +2,8 @@
 
 use trueup_core::lines::LineSegment;
 
-/// A segment along a photograph's frame is dropped if more than [`BORDER_SHARE`] of its length lies within this distance
-/// of one border, in pixels: an artifact of scans and of earlier warps.
+/// A segment along a photograph's frame is dropped if more than [`BORDER_SHARE`] of its length lies within this
+/// distance of one border, in pixels: an artifact of scans and of earlier warps.
 const BORDER_DISTANCE_PX: f64 = 5.0;
 
 /// See [`BORDER_DISTANCE_PX`].

@@ -1,8 +1,9 @@
 //! What two photographs show alike by all that their pictures tell, whatever a panorama makes of it.
 //!
-//! The matches that align a panorama are those that agree with homographies, and what is measured by them alone says nothing of things elsewhere in
-//! depth. Here counts every match of which its neighbors say the same and that the geometry of two cameras explains. What of it no plane of a pair
-//! explains draws the pair's overlap together where it lies.
+//! The matches that align a panorama are those that agree with homographies, and what is measured by them alone says
+//! nothing of things elsewhere in depth. Here counts every match of which its neighbors say the same and that the
+//! geometry of two cameras explains. What of it no plane of a pair explains draws the pair's overlap together where it
+//! lies.
 
 use nalgebra::{Vector2, Vector3};
 use rand::Rng;
@@ -21,7 +22,8 @@ use super::ransac::{HomographySearch, find_homography};
 use super::refined::Refiner;
 use crate::features::Features;
 
-/// Distance from the epipolar geometry up to which a match agrees with it, working pixels: four times what places of features err by.
+/// Distance from the epipolar geometry up to which a match agrees with it, working pixels: four times what places of
+/// features err by.
 const EPIPOLAR_PX: f64 = 2.0;
 /// Nearest other matches that are asked whether they moved alike.
 const NEIGHBORS: usize = 8;
@@ -31,7 +33,8 @@ const ALIKE: usize = 2;
 const ALIKE_PX: f64 = 2.0;
 /// ... and this part of their distance: slanted surfaces, and what one homography leaves of a lens.
 const ALIKE_SLOPE: f64 = 0.2;
-/// Farthest from where the homography of most matches has it that a match may lie, in diagonals: repeated things lie elsewhere alike, too.
+/// Farthest from where the homography of most matches has it that a match may lie, in diagonals: repeated things lie
+/// elsewhere alike, too.
 const FARTHEST_DIAGONAL: f64 = 0.25;
 
 /// A photograph whose matches are sought.
@@ -41,12 +44,14 @@ pub struct SeenFeatures<'a> {
     pub features: &'a Features,
     /// The frame these are measured in.
     pub frame: &'a WorkingFrame,
-    /// Its camera in working pixels. Focal length and rotation may be wrong, for they take no part; the lens tells what is straight.
+    /// Its camera in working pixels. Focal length and rotation may be wrong, for they take no part; the lens tells what
+    /// is straight.
     pub camera: &'a Camera,
 }
 
-/// The matches of two photographs that are consistent: of which two of the eight neighbors moved alike, within a quarter of the diagonal of where
-/// most moved, and that one epipolar geometry explains. None if no homography is agreed on by `min_inliers`, or fewer than that are consistent.
+/// The matches of two photographs that are consistent: of which two of the eight neighbors moved alike, within a
+/// quarter of the diagonal of where most moved, and that one epipolar geometry explains. None if no homography is
+/// agreed on by `min_inliers`, or fewer than that are consistent.
 ///
 /// The same for any number of threads; another order of the two photographs draws other samples.
 ///
@@ -54,7 +59,8 @@ pub struct SeenFeatures<'a> {
 /// [`Error::Options`](trueup_core::Error::Options), [`Error::Cancelled`](trueup_core::Error::Cancelled).
 ///
 /// # Source
-/// That true matches are told by what moves alike around them: Bian and others, GMS: grid-based motion statistics, 2017; here by nearest neighbors.
+/// That true matches are told by what moves alike around them: Bian and others, GMS: grid-based motion statistics,
+/// 2017; here by nearest neighbors.
 pub fn consistent_matches(
     a: &SeenFeatures<'_>,
     b: &SeenFeatures<'_>,
@@ -129,11 +135,12 @@ fn supported(points: &MatchedPoints, b_from_a: &Homography, farthest_px: f64) ->
     surroundings.near.iter().copied().filter(|&k| surroundings.is_supported(k)).collect()
 }
 
-/// The matches, ascending, that no plane of their pair explains (`is_known` says which one does) and that are consistent: of which two of the eight
-/// neighbors moved alike, and that have one epipolar geometry with those on planes.
+/// The matches, ascending, that no plane of their pair explains (`is_known` says which one does) and that are
+/// consistent: of which two of the eight neighbors moved alike, and that have one epipolar geometry with those on
+/// planes.
 ///
-/// `cameras` need be no better than pinholes of any focal length where lenses bend little: a linear map of the bearings, and a bend within what a
-/// match may err by.
+/// `cameras` need be no better than pinholes of any focal length where lenses bend little: a linear map of the
+/// bearings, and a bend within what a match may err by.
 pub(super) fn matches_elsewhere(
     points: &MatchedPoints,
     is_known: &[bool],
@@ -172,7 +179,8 @@ mod tests {
 
     use super::*;
 
-    /// A lattice of 20 px that moved by 5 px to the right; every 17th match is elsewhere by itself, the last 9 are a thing of its own depth.
+    /// A lattice of 20 px that moved by 5 px to the right; every 17th match is elsewhere by itself, the last 9 are a
+    /// thing of its own depth.
     fn lattice() -> (MatchedPoints, Vec<usize>) {
         let places: Vec<Vector2<f64>> =
             (0..300).map(|k| Vector2::new(f64::from(k % 20), f64::from(k / 20)) * 20.0).collect();

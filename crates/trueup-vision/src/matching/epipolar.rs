@@ -1,12 +1,13 @@
 //! The epipolar geometry of two photographs that many of their matches agree on.
 //!
 //! # Source
-//! Hartley and Zisserman, Multiple View Geometry, sections 11.1 to 11.6: the eight-point algorithm on normalized coordinates, Sampson's
-//! distance, RANSAC; samples are judged as MSAC does (Torr and Zisserman, MLESAC, section 4).
+//! Hartley and Zisserman, Multiple View Geometry, sections 11.1 to 11.6: the eight-point algorithm on normalized
+//! coordinates, Sampson's distance, RANSAC; samples are judged as MSAC does (Torr and Zisserman, MLESAC, section 4).
 //!
 //! # Departures
-//! On bearings instead of places, so that lenses that bend have one, too. What is normalized is their second moment, which for pinholes does what
-//! Hartley's normalization does. A wrong focal length is a linear map of the bearings, which the matrix takes over.
+//! On bearings instead of places, so that lenses that bend have one, too. What is normalized is their second moment,
+//! which for pinholes does what Hartley's normalization does. A wrong focal length is a linear map of the bearings,
+//! which the matrix takes over.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use rand::Rng;
@@ -75,8 +76,9 @@ impl EpipolarGeometry {
 /// The eigenvector of the least eigenvalue of a positive semidefinite matrix; `None` if it is not finite.
 ///
 /// # Source
-/// Golub and Van Loan, Matrix Computations, section 8.2.2: inverse iteration, here from a matrix that is shifted by a trillionth, so that one without a
-/// rest, as eight matches give, has an inverse, too. It takes a tenth of the time of all nine eigenvectors.
+/// Golub and Van Loan, Matrix Computations, section 8.2.2: inverse iteration, here from a matrix that is shifted by a
+/// trillionth, so that one without a rest, as eight matches give, has an inverse, too. It takes a tenth of the time of
+/// all nine eigenvectors.
 fn least_eigenvector(matrix: &SMatrix<f64, 9, 9>) -> Option<SVector<f64, 9>> {
     const SHIFT: f64 = 1e-12;
     /// A step that turns the vector by less ends the iteration, radians.
@@ -105,10 +107,12 @@ fn whitening(bearings: &[Vector3<f64>]) -> Option<Matrix3<f64>> {
     (moment / bearings.len() as f64).cholesky()?.l().try_inverse()
 }
 
-/// The matches, ascending, that agree within an angle of `within` radians with the epipolar geometry of least truncated squares; none if there are
-/// fewer than eight. Bearings have the length 1, those of a match the same number in both lists.
+/// The matches, ascending, that agree within an angle of `within` radians with the epipolar geometry of least truncated
+/// squares; none if there are fewer than eight. Bearings have the length 1, those of a match the same number in both
+/// lists.
 ///
-/// Photographs from one point have no epipolar geometry of their own: what agrees with their turn agrees with what is found, too.
+/// Photographs from one point have no epipolar geometry of their own: what agrees with their turn agrees with what is
+/// found, too.
 pub(super) fn epipolar_matches(
     in_a: &[Vector3<f64>],
     in_b: &[Vector3<f64>],
@@ -157,8 +161,8 @@ mod tests {
 
     use super::*;
 
-    /// Points at depths of 3 to 9, seen from the origin and from `center` by a camera turned by 10 degrees; of every fifth another point's bearing
-    /// in b.
+    /// Points at depths of 3 to 9, seen from the origin and from `center` by a camera turned by 10 degrees; of every
+    /// fifth another point's bearing in b.
     fn views(center: Vector3<f64>) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
         let rotation = rotation_about_y(-0.17);
         let point = |k: usize| {
@@ -188,7 +192,8 @@ mod tests {
         assert!((0..100_usize).filter(|k| !k.is_multiple_of(5)).all(|k| found.contains(&k)), "{found:?}");
     }
 
-    /// Against nalgebra's decomposition: with a clear least eigenvalue, without a rest, and with two that are nearly alike.
+    /// Against nalgebra's decomposition: with a clear least eigenvalue, without a rest, and with two that are nearly
+    /// alike.
     #[test]
     fn the_least_eigenvector_is_that_of_all_nine() {
         let matrix = |count: usize, noise: f64| {
@@ -217,7 +222,8 @@ mod tests {
 
     #[test]
     fn the_error_is_the_angle_to_the_epipolar_plane() {
-        // A step along x: planes hold the x axis. Half of the angle to the common plane falls on either bearing, so that it counts 1/sqrt(2).
+        // A step along x: planes hold the x axis. Half of the angle to the common plane falls on either bearing, so
+        // that it counts 1/sqrt(2).
         let geometry = EpipolarGeometry { matrix: Vector3::x().cross_matrix() };
         let (a, b) = (Vector3::z(), Vector3::new(0.0, 0.01_f64.sin(), 0.01_f64.cos()));
         let error = geometry.squared_error(&a, &b).sqrt();

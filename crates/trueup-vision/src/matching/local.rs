@@ -46,8 +46,8 @@ impl<'a> LocalOptimizer<'a> {
     /// early where it arrives at the cost `known` of a minimum found before.
     ///
     /// # Source
-    /// Chum, Matas and Kittler, Locally optimized RANSAC, with shrinking thresholds; the cost is that of Torr and Zisserman,
-    /// MLESAC, section 4, minimized by Gauss and Newton's method.
+    /// Chum, Matas and Kittler, Locally optimized RANSAC, with shrinking thresholds; the cost is that of Torr and
+    /// Zisserman, MLESAC, section 4, minimized by Gauss and Newton's method.
     ///
     /// # Departures
     /// A step is a small projective map of b after the present one, so that no denominators appear in its equations.
@@ -115,9 +115,11 @@ struct Sums {
 }
 
 impl Sums {
-    /// The projective map near the identity by which the residuals become least; `None` if too few matches determine it.
+    /// The projective map near the identity by which the residuals become least; `None` if too few matches determine
+    /// it.
     ///
-    /// With parameters s it moves (x, y) by (s0 x + s1 y + s2, s3 x + s4 y + s5) - (s6 x + s7 y) (x, y), to first order.
+    /// With parameters s it moves (x, y) by (s0 x + s1 y + s2, s3 x + s4 y + s5) - (s6 x + s7 y) (x, y), to first
+    /// order.
     fn step(&self) -> Option<Matrix3<f64>> {
         let [one, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, corner_xx, corner_xy, corner_yy] = self.moments;
         if one < FEWEST {

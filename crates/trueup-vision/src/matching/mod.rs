@@ -1,12 +1,13 @@
 //! Matches between pairs of photographs, and which pairs overlap.
 //!
-//! Descriptors are compared exhaustively (`putative`), what was written at the same place of both photographs is left out (`written`), a homography is sought that many matches agree on
-//! (`ransac`), the pair is judged by how many do (`pair`), and the matches of a joined pair are completed by further planes
-//! (`planes`). Where a lens bends so that no homography holds, or is told, turns
-//! are sought on rays (`turned`), and stand in for the homography. What surrounds a match places it more exactly than its features (`refined`), and
-//! what lies between matches tells equal things from one thing (`resemblance`). What the pairs show of each other tells which pictures are
-//! no photographs of the scene (`strangers`). Whether or not homographies explain it, `consistent` finds what two photographs show alike, to measure
-//! a panorama by (`epipolar`).
+//! Descriptors are compared exhaustively (`putative`), what was written at the same place of both photographs is left
+//! out (`written`), a homography is sought that many matches agree on (`ransac`), the pair is judged by how many do
+//! (`pair`), and the matches of a joined pair are completed by further planes (`planes`). Where a lens bends so that no
+//! homography holds, or is told, turns are sought on rays (`turned`), and stand in for the homography. What surrounds a
+//! match places it more exactly than its features (`refined`), and what lies between matches tells equal things from
+//! one thing (`resemblance`). What the pairs show of each other tells which pictures are no photographs of the scene
+//! (`strangers`). Whether or not homographies explain it, `consistent` finds what two photographs show alike, to
+//! measure a panorama by (`epipolar`).
 
 mod compared;
 mod consistent;
@@ -83,11 +84,12 @@ impl<'a> MatchingInput<'a> {
 /// the pairs, each naming the smaller index first.
 ///
 /// A pair is joined if its homography is believable in the overlap it predicts, and the matches that agree with it are
-/// at least `min_inliers` and pass the Brown-Lowe test, unless what lies between them looks different. Of a pair that the user's graph joins, fewer must agree.
+/// at least `min_inliers` and pass the Brown-Lowe test, unless what lies between them looks different. Of a pair that
+/// the user's graph joins, fewer must agree.
 ///
 /// # Errors
-/// [`trueup_core::Error::Options`]; [`trueup_core::Error::Input`] if a pair names a photograph that is not there or twice the same, or if features
-/// contradict themselves; those of reading features; [`trueup_core::Error::Cancelled`].
+/// [`trueup_core::Error::Options`]; [`trueup_core::Error::Input`] if a pair names a photograph that is not there or
+/// twice the same, or if features contradict themselves; those of reading features; [`trueup_core::Error::Cancelled`].
 pub fn run(
     input: &MatchingInput<'_>,
     options: &MatchingOptions,

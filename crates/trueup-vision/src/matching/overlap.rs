@@ -59,8 +59,9 @@ impl<'a> PredictedOverlap<'a> {
         }
     }
 
-    /// The share of one photograph that the other shows, of that of which it is more, by `side` x `side` places spread evenly over each, from border to border. What lies
-    /// beyond the other by up to `margin` of its sides counts as shown.
+    /// The share of one photograph that the other shows, of that of which it is more, by `side` x `side` places spread
+    /// evenly over each, from border to border. What lies beyond the other by up to `margin` of its sides counts as
+    /// shown.
     pub(crate) fn larger_share(&self, side: usize, margin: f64) -> f64 {
         let share = |frame: &WorkingFrame, other: &WorkingFrame, map: &dyn Fn(Vector2<f64>) -> Option<Vector2<f64>>| {
             let place = |cell: usize, length: f64| cell as f64 / (side - 1) as f64 * length;
@@ -77,8 +78,9 @@ impl<'a> PredictedOverlap<'a> {
         of_a.max(of_b)
     }
 
-    /// Whether a is seen to miss b, which reaches `margin` of its sides beyond each border, and b to miss such an a. Most photographs that paths over
-    /// overlaps lead to are far apart, which four corners tell in place of all places. Of a turn nothing is seen.
+    /// Whether a is seen to miss b, which reaches `margin` of its sides beyond each border, and b to miss such an a.
+    /// Most photographs that paths over overlaps lead to are far apart, which four corners tell in place of all places.
+    /// Of a turn nothing is seen.
     fn misses(&self, margin: f64) -> [bool; 2] {
         let Maps::Homographies { b_from_a, a_from_b } = &self.maps else { return [false; 2] };
         // What is linear in a place is negative at all of them where it is at their corners.
@@ -122,8 +124,8 @@ fn corners(frame: &WorkingFrame) -> [Vector2<f64>; 4] {
     [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]].map(Vector2::from)
 }
 
-/// The lines (x, y, 1) that are not negative where a point is carried into `target`, which reaches `margin` of its sides beyond each border: there
-/// -m W <= x/w <= (1 + m) W and the like of y, with w > 0, is linear in the point.
+/// The lines (x, y, 1) that are not negative where a point is carried into `target`, which reaches `margin` of its
+/// sides beyond each border: there -m W <= x/w <= (1 + m) W and the like of y, with w > 0, is linear in the point.
 fn borders(target_from_source: &Homography, target: &WorkingFrame, margin: f64) -> [Vector3<f64>; 4] {
     let rows: [Vector3<f64>; 3] = std::array::from_fn(|row| target_from_source.0.row(row).transpose());
     let [x, y, w] = rows;
@@ -192,7 +194,8 @@ mod tests {
         assert_eq!(overlap.larger_share(8, 0.1), 0.625);
     }
 
-    /// A photograph drawn half as large in the middle of another one is shown wholly, which itself is shown to a quarter.
+    /// A photograph drawn half as large in the middle of another one is shown wholly, which itself is shown to a
+    /// quarter.
     #[test]
     fn the_larger_share_is_that_of_the_narrower_photograph() {
         let frame = frame();
@@ -203,8 +206,9 @@ mod tests {
         }
     }
 
-    /// Against the places one by one, whatever the turn. With a margin of a twentieth, 40 px, photographs of 60 degrees (a focal length of 693 px) share
-    /// nothing from 30 + atan(440 / 693) = 62.4 degrees on, those of 90 (400 px) from 45 + atan(440 / 400) = 92.7 on, past the horizon, too.
+    /// Against the places one by one, whatever the turn. With a margin of a twentieth, 40 px, photographs of 60 degrees
+    /// (a focal length of 693 px) share nothing from 30 + atan(440 / 693) = 62.4 degrees on, those of 90 (400 px) from
+    /// 45 + atan(440 / 400) = 92.7 on, past the horizon, too.
     #[test]
     fn shares_are_those_of_all_places_where_corners_tell_that_there_are_none() {
         let frame = frame();

@@ -23,8 +23,8 @@ use super::resemblance::Resemblance;
 use super::turned::{TurnConsensus, TurnedLens, find_turned_lens};
 use crate::features::Features;
 
-/// alpha of the Brown-Lowe test: a pair is joined if more than alpha + beta n_f of its n_f matches in the predicted overlap
-/// agree (Brown and Lowe, section 3.2).
+/// alpha of the Brown-Lowe test: a pair is joined if more than alpha + beta n_f of its n_f matches in the predicted
+/// overlap agree (Brown and Lowe, section 3.2).
 const BROWN_LOWE_ALPHA: f64 = 8.0;
 
 /// beta of the Brown-Lowe test, see [`BROWN_LOWE_ALPHA`].
@@ -41,15 +41,17 @@ const TURN_FACTOR: f64 = 1.25;
 /// ... and this many more: a homography has two unknowns more to please wrong matches with.
 const TURN_MORE: usize = 15;
 
-/// Fewest matches elsewhere in depth that are believed if they are confirmed by what surrounds them. Beside a plane, any two tell where the epipole is
-/// and so agree.
+/// Fewest matches elsewhere in depth that are believed if they are confirmed by what surrounds them. Beside a plane,
+/// any two tell where the epipole is and so agree.
 const FEWEST_CONFIRMED: usize = 3;
-/// The share of them that must be confirmed, of that of matches on planes. Of 27 overlaps of photographs from one point in which eight or more were
-/// found, all false, 19 come to none and one to this with three confirmed; of 41 overlaps of seven photographed sets 33 do, most of these to twice as much.
+/// The share of them that must be confirmed, of that of matches on planes. Of 27 overlaps of photographs from one point
+/// in which eight or more were found, all false, 19 come to none and one to this with three confirmed; of 41 overlaps
+/// of seven photographed sets 33 do, most of these to twice as much.
 const LEAST_CONFIRMED: f64 = 0.3;
 /// Matches on planes that are asked; more hardly change their share.
 const ASKED_ON_PLANES: usize = 60;
-/// Fewest that are believed where nothing is known of what surrounds features: of photographs from one point six false ones came together at most.
+/// Fewest that are believed where nothing is known of what surrounds features: of photographs from one point six false
+/// ones came together at most.
 const FEWEST_UNCONFIRMED: usize = 8;
 
 /// A photograph of a pair.
@@ -120,8 +122,8 @@ impl<'a> PairInput<'a> {
     }
 }
 
-/// The turned lens that clearly more matches agree with than with the homography, if there is one; of lenses that are told wholly, and are no
-/// pinholes, the one that as many agree with.
+/// The turned lens that clearly more matches agree with than with the homography, if there is one; of lenses that are
+/// told wholly, and are no pinholes, the one that as many agree with.
 fn better_turn(
     input: &PairInput<'_>,
     points: &MatchedPoints,
@@ -153,9 +155,10 @@ fn better_turn(
 /// Where clearly more matches agree with a lens that turned than with any homography, that is what is believed.
 ///
 /// A pair is joined if its homography is believable in the overlap it predicts, and the matches that agree with it are
-/// at least `min_inliers` and more than alpha + beta n_f of the n_f matches in that overlap. Where they are `min_inliers` and not enough, those on
-/// further planes and elsewhere in depth count with them. It is not joined where little else in the overlap matches or looks alike
-/// ([`Resemblance`]). A forced pair needs only [`MIN_INLIERS_BY_GRAPH`].
+/// at least `min_inliers` and more than alpha + beta n_f of the n_f matches in that overlap. Where they are
+/// `min_inliers` and not enough, those on further planes and elsewhere in depth count with them. It is not joined where
+/// little else in the overlap matches or looks alike ([`Resemblance`]). A forced pair needs only
+/// [`MIN_INLIERS_BY_GRAPH`].
 ///
 /// # Errors
 /// [`Error::Options`]; [`Error::Input`] if the photographs are the same or features contradict themselves;
@@ -165,7 +168,8 @@ fn better_turn(
 /// The test: Brown and Lowe, Automatic panoramic image stitching using invariant features, section 3.2.
 ///
 /// # Departures
-/// Brown and Lowe count what agrees with one homography, since their cameras turn about one point, and join whatever passes: equal bays of a hall do, too.
+/// Brown and Lowe count what agrees with one homography, since their cameras turn about one point, and join whatever
+/// passes: equal bays of a hall do, too.
 pub(super) fn match_pair(
     input: &PairInput<'_>,
     options: &MatchingOptions,
@@ -224,7 +228,8 @@ pub(super) fn match_pair(
     pair.agreeing = model.inliers.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
     pair.b_from_a = Some(scaled_rows(&model.b_from_a));
     input.judge(&mut pair, options);
-    // Before strong parallax no plane alone explains enough of the matches: what else two cameras explain counts as well.
+    // Before strong parallax no plane alone explains enough of the matches: what else two cameras explain counts as
+    // well.
     let is_promising = pair.verdict == PairVerdict::TooFewInliers && pair.agreeing >= options.min_inliers;
     if pair.verdict.is_joined() || is_promising {
         let modeled = ModeledPair { input, putative, points, model: &model };
@@ -335,7 +340,8 @@ impl ModeledPair<'_> {
         Refiner { a: &a.features.surroundings, b: &b.features.surroundings }
     }
 
-    /// Whether what surrounds the matches found `elsewhere` confirms as many of them as it does of things that are there.
+    /// Whether what surrounds the matches found `elsewhere` confirms as many of them as it does of things that are
+    /// there.
     fn is_believed(&self, elsewhere: &[usize], is_known: &[bool]) -> bool {
         let refiner = self.refiner();
         if !refiner.sees() {
@@ -357,7 +363,8 @@ impl ModeledPair<'_> {
         count >= FEWEST_CONFIRMED && count as f64 >= LEAST_CONFIRMED * usual * elsewhere.len() as f64
     }
 
-    /// The final matches, those that agree with the model and then those of further planes; and which of the putative ones are among them.
+    /// The final matches, those that agree with the model and then those of further planes; and which of the putative
+    /// ones are among them.
     fn all_inliers(&self, generator: &mut impl Rng) -> (Vec<PointMatch>, Vec<bool>) {
         let mut is_known = vec![false; self.putative.len()];
         let mut inliers: Vec<PointMatch> = Vec::new();
@@ -370,8 +377,8 @@ impl ModeledPair<'_> {
         (inliers, is_known)
     }
 
-    /// The planes beside the model. Under a lens that bends, what the turn explains lies on planes only here and there: of such pairs they are
-    /// sought among the other matches.
+    /// The planes beside the model. Under a lens that bends, what the turn explains lies on planes only here and there:
+    /// of such pairs they are sought among the other matches.
     fn further_planes(&self, generator: &mut impl Rng) -> Vec<Consensus> {
         let is_plausible = |map: &Homography| self.input.is_plausible(map);
         let (map, diagonal_px) = (&self.model.b_from_a, self.input.b.frame.diagonal());

@@ -13,8 +13,8 @@ const DUPLICATE_PX: f64 = 0.5;
 /// same place.
 const SECOND_SEPARATION_PX: f64 = 3.0;
 
-/// Matches are dropped whose squared distance exceeds the pair's mean by more than so many standard deviations (as in the
-/// implementation of natural image stitching with the global similarity prior).
+/// Matches are dropped whose squared distance exceeds the pair's mean by more than so many standard deviations (as in
+/// the implementation of natural image stitching with the global similarity prior).
 const DISTANCE_DEVIATIONS: f64 = 4.25;
 
 /// Two points that look alike.
@@ -35,8 +35,9 @@ pub struct PutativeMatch {
 /// The putative matches of two photographs, in the order of the points of a.
 ///
 /// A point's distance to another is the smallest over their descriptors. A match is kept if its point of b is nearest
-/// to that of a, and the reverse; if the nearest point of b that lies farther than `SECOND_SEPARATION_PX` from it is farther away by the factor 1 / `max_distance_ratio`; and if its distance does not stand out of the pair's.
-/// Of duplicates, which share both places, the nearest is kept.
+/// to that of a, and the reverse; if the nearest point of b that lies farther than `SECOND_SEPARATION_PX` from it is
+/// farther away by the factor 1 / `max_distance_ratio`; and if its distance does not stand out of the pair's. Of
+/// duplicates, which share both places, the nearest is kept.
 ///
 /// # Source
 /// The ratio test: Lowe, Distinctive image features from scale-invariant keypoints, section 7.1. The cut of distances

@@ -2,14 +2,14 @@
 //!
 //! # Source
 //! Fischler and Bolles, Random sample consensus; the cost is MSAC's (Torr and Zisserman, MLESAC, section 4), samples of
-//! the most distinctive matches come first as in PROSAC (Chum and Matas, 2005), and promising ones are optimized locally
-//! (Chum, Matas and Kittler, Locally optimized RANSAC).
+//! the most distinctive matches come first as in PROSAC (Chum and Matas, 2005), and promising ones are optimized
+//! locally (Chum, Matas and Kittler, Locally optimized RANSAC).
 //!
 //! # Departures
-//! Photographs with parallax have several maps that many matches agree on nearly equally, and a sample without outliers may
-//! lead to any of them. That the draw does not decide between them, more is drawn than the textbook asks for
-//! (`PATIENCE`), and samples are optimized that are nearly as good as the best sample (`PROMISING`): measured against an
-//! optimized map, hardly a sample would be good enough to lead anywhere else.
+//! Photographs with parallax have several maps that many matches agree on nearly equally, and a sample without outliers
+//! may lead to any of them. That the draw does not decide between them, more is drawn than the textbook asks for
+//! (`PATIENCE`), and samples are optimized that are nearly as good as the best sample (`PROMISING`): measured against
+//! an optimized map, hardly a sample would be good enough to lead anywhere else.
 
 use nalgebra::{Matrix3, Vector2};
 use rand::{Rng, RngExt};
@@ -22,7 +22,8 @@ use super::matched_points::{MatchedPoints, squared_error};
 const SAMPLE: usize = 4;
 /// Twice the smallest area of a triangle of sample points, in square pixels; below, the three count as collinear.
 const MIN_TRIANGLE_PX2: f64 = 20.0;
-/// Probability of having drawn a sample of inliers (Fischler and Bolles); [`PATIENCE`] times as many as that takes are drawn.
+/// Probability of having drawn a sample of inliers (Fischler and Bolles); [`PATIENCE`] times as many as that takes are
+/// drawn.
 const CONFIDENCE: f64 = 0.995;
 /// How many times the samples that would give one without outliers are drawn: such a sample may still be too noisy, too
 /// narrow, or of another plane.

@@ -1,5 +1,5 @@
-//! Places of matches, more exact than those of features, and whether matches can be believed: what surrounds the one is found again around the
-//! other.
+//! Places of matches, more exact than those of features, and whether matches can be believed: what surrounds the one is
+//! found again around the other.
 
 use std::sync::LazyLock;
 
@@ -19,10 +19,12 @@ const FARTHEST: f64 = 2.0;
 const ROUNDS: usize = 10;
 /// A step shorter than this is the last one, in samples.
 const CONVERGED: f64 = 0.01;
-/// A match keeps its place where the new one is less certain than this, by its standard deviation in samples: of places in cut
-/// photographs (four rows of known cameras) those of features err by 0.45 px where that is 0.2, and the new ones by 0.2.
+/// A match keeps its place where the new one is less certain than this, by its standard deviation in samples: of places
+/// in cut photographs (four rows of known cameras) those of features err by 0.45 px where that is 0.2, and the new ones
+/// by 0.2.
 const LARGEST_DEVIATION: f64 = 0.2;
-/// Distance of the samples by which a match is confirmed, in scales of its feature: what told a large feature is not in the finest window.
+/// Distance of the samples by which a match is confirmed, in scales of its feature: what told a large feature is not in
+/// the finest window.
 const SPACING_PER_SCALE: f64 = 0.5;
 
 /// A match and how large its feature in photograph a is.
@@ -41,12 +43,12 @@ pub(super) struct Refiner<'a> {
 }
 
 impl Refiner<'_> {
-    /// The matches, those in b where what surrounds them in a is found again, if that is surer than what features tell. `b_from_a` tells the shape of
-    /// the surroundings; where matches lie, these tell better.
+    /// The matches, those in b where what surrounds them in a is found again, if that is surer than what features tell.
+    /// `b_from_a` tells the shape of the surroundings; where matches lie, these tell better.
     ///
     /// # Source
-    /// Gauss-Newton steps on the differences of two windows, with those of the first linearized once: Baker and Matthews, Lucas-Kanade 20 years on,
-    /// 2004 (inverse compositional); gain and offset of the light are fitted along.
+    /// Gauss-Newton steps on the differences of two windows, with those of the first linearized once: Baker and
+    /// Matthews, Lucas-Kanade 20 years on, 2004 (inverse compositional); gain and offset of the light are fitted along.
     pub(super) fn refined(
         &self,
         mut matches: Vec<PointMatch>,
@@ -148,7 +150,8 @@ struct Window {
 }
 
 impl Window {
-    /// The window around a place of a picture, each sample of which comes to `shape` there; `None` where it reaches out of it.
+    /// The window around a place of a picture, each sample of which comes to `shape` there; `None` where it reaches out
+    /// of it.
     fn of(picture: &Raster<u8>, place: Vector2<f64>, shape: &Matrix2<f64>) -> Option<Self> {
         let reach = |axis: usize| f64::from(RADIUS) * shape.row(axis).norm();
         let length = [picture.width(), picture.height()];
@@ -181,7 +184,8 @@ struct Template {
     gradients: Vec<Vector2<f64>>,
     /// The inverse of the weighted sum of gradients times themselves.
     inverse: Matrix2<f64>,
-    /// The least that a sample's way changes the window, whichever the direction: weighted mean square, gray levels per sample.
+    /// The least that a sample's way changes the window, whichever the direction: weighted mean square, gray levels per
+    /// sample.
     least_change: f64,
 }
 
@@ -246,7 +250,8 @@ mod tests {
         Raster::from_data(width, height, 1, (0..width * height).map(value).collect()).expect("as many")
     }
 
-    /// Photograph b is turned by 20 degrees, drawn larger by a tenth and exposed otherwise. Matches that are off by up to a pixel come to a 20th.
+    /// Photograph b is turned by 20 degrees, drawn larger by a tenth and exposed otherwise. Matches that are off by up
+    /// to a pixel come to a 20th.
     #[test]
     fn a_match_is_found_where_it_is_whatever_the_turn_and_the_light() {
         let turn = nalgebra::Rotation2::new(20_f64.to_radians());
@@ -274,7 +279,8 @@ mod tests {
     #[test]
     fn where_nothing_tells_a_place_a_match_stays() {
         let waves = picture(|level| level, |place| place);
-        // An edge tells its place across alone; a flat one, a border and an unknown picture nothing; another scene something else.
+        // An edge tells its place across alone; a flat one, a border and an unknown picture nothing; another scene
+        // something else.
         let edge = picture(|level| level, |place| Vector2::new(place.x, 0.0));
         let flat = picture(|_| 90.0, |place| place);
         let other = picture(|level| level, |place| Vector2::new(2.3 * place.y + 400.0, 1.7 * place.x));

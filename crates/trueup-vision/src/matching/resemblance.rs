@@ -1,9 +1,10 @@
 //! Whether two photographs look alike where matches lay them over each other, beside the matches themselves.
 //!
-//! Equal things, as the bays of a hall, match like one thing: where enough of their matches agree, photographs that share nothing would be joined. But
-//! between those matches books, stains and shadows differ, so that far fewer of the things shown match than in photographs of one place, and what
-//! surrounds the others does not look alike. Either alone is also true of photographs that overlap: few things match where it is dark or one of them is
-//! shaken, and leaves in the wind look otherwise.
+//! Equal things, as the bays of a hall, match like one thing: where enough of their matches agree, photographs that
+//! share nothing would be joined. But between those matches books, stains and shadows differ, so that far fewer of the
+//! things shown match than in photographs of one place, and what surrounds the others does not look alike. Either alone
+//! is also true of photographs that overlap: few things match where it is dark or one of them is shaken, and leaves in
+//! the wind look otherwise.
 
 use nalgebra::{Matrix2, Vector2};
 use trueup_core::raster::Raster;
@@ -13,13 +14,14 @@ use super::refined::derivative;
 use crate::features::Features;
 use crate::gray::gray_at;
 
-/// Matches in the overlap for each textured square there, below which photographs are compared. Of 34 pairs of photographs of a hall's equal bays that
-/// share nothing and were joined, all have less (0.13 to 0.34). Of 1,500 joined pairs of photographs that overlap (59 photographed sets; cut rows of eleven
-/// panoramas, as they are, noisy, shaken, coarsely compressed, unevenly exposed, bent as by parallax) three have, one of them of equal pillars
-/// between other frescoes; of rows in which all leaves are moved by some 3 px seven.
+/// Matches in the overlap for each textured square there, below which photographs are compared. Of 34 pairs of
+/// photographs of a hall's equal bays that share nothing and were joined, all have less (0.13 to 0.34). Of 1,500 joined
+/// pairs of photographs that overlap (59 photographed sets; cut rows of eleven panoramas, as they are, noisy, shaken,
+/// coarsely compressed, unevenly exposed, bent as by parallax) three have, one of them of equal pillars between other
+/// frescoes; of rows in which all leaves are moved by some 3 px seven.
 const FEW_MATCHED: f64 = 0.35;
-/// Lower quartile of the correlations below which photographs do not look alike. Of the 34 pairs it is 0.26 to 0.44, and once 0.56; of the three 0.31, 0.31
-/// and 0.55, of the seven 0.48 to 0.67.
+/// Lower quartile of the correlations below which photographs do not look alike. Of the 34 pairs it is 0.26 to 0.44,
+/// and once 0.56; of the three 0.31, 0.31 and 0.55, of the seven 0.48 to 0.67.
 const LEAST_ALIKE: f64 = 0.5;
 /// Textured squares in the overlap from which on there is anything to tell.
 const FEWEST_SQUARES: usize = 40;
@@ -29,8 +31,8 @@ const COMPARED_SQUARES: usize = 150;
 const SPACING_PX: usize = 24;
 /// Half of a square's side, less half a pixel, working pixels.
 const HALF: i32 = 10;
-/// How far beside its predicted place a square is sought along each axis, working pixels: so far are homographies of few matches off, and what lies
-/// before and behind the plane they tell.
+/// How far beside its predicted place a square is sought along each axis, working pixels: so far are homographies of
+/// few matches off, and what lies before and behind the plane they tell.
 const SEARCHED: i32 = 6;
 /// Deviation of a square's gray values from which on it is textured, gray levels of 255.
 const TEXTURED: f64 = 8.0;
@@ -45,8 +47,8 @@ pub(super) struct Resemblance<'a> {
 }
 
 impl Resemblance<'_> {
-    /// Whether few of the things in the overlap are among its `in_overlap` matches, and the others do not look alike. False where nothing is known of what
-    /// surrounds features.
+    /// Whether few of the things in the overlap are among its `in_overlap` matches, and the others do not look alike.
+    /// False where nothing is known of what surrounds features.
     pub(super) fn is_missing(&self, in_overlap: usize) -> bool {
         let few = (in_overlap as f64 / FEW_MATCHED) as usize;
         // Of most overlaps so many match that all squares of the photograph would be fewer.
@@ -68,7 +70,8 @@ impl Resemblance<'_> {
         alike.get(alike.len() / 4).is_some_and(|&quartile| quartile < LEAST_ALIKE)
     }
 
-    /// Middles of the squares of a that b shows and that hold a feature in both: where parts are ignored there are none.
+    /// Middles of the squares of a that b shows and that hold a feature in both: where parts are ignored there are
+    /// none.
     fn places(&self) -> Vec<[usize; 2]> {
         let (of_a, of_b) = (Occupied::new(self.a), Occupied::new(self.b));
         let is_shown = |&middle: &[usize; 2]| {
@@ -91,7 +94,8 @@ impl Resemblance<'_> {
         (moments.deviation() >= TEXTURED).then_some(Textured { at: center(middle), values, moments })
     }
 
-    /// The largest correlation of a square with those around the place in b that the matches predict; `None` at a border.
+    /// The largest correlation of a square with those around the place in b that the matches predict; `None` at a
+    /// border.
     fn correlation(&self, square: &Textured) -> Option<f64> {
         let in_b = |point| self.overlap.point_in_b(point);
         let (place, shape) = (in_b(square.at)?, derivative(square.at, &in_b)?);
@@ -150,7 +154,8 @@ const SIDE: usize = 2 * HALF as usize + 1;
 /// ... and of what is searched for it.
 const SEEN_SIDE: usize = 2 * (HALF + SEARCHED) as usize + 1;
 
-/// Gray values around a place of b, in rows of [`SEEN_SIDE`], each pixel of which comes to `shape` there; `None` where they reach out of the picture.
+/// Gray values around a place of b, in rows of [`SEEN_SIDE`], each pixel of which comes to `shape` there; `None` where
+/// they reach out of the picture.
 fn seen(picture: &Raster<u8>, place: Vector2<f64>, shape: &Matrix2<f64>) -> Option<Vec<f64>> {
     let offsets = || (-(HALF + SEARCHED)..=HALF + SEARCHED).map(f64::from);
     let places = offsets().flat_map(|y| offsets().map(move |x| Vector2::new(x, y)));
@@ -249,8 +254,8 @@ mod tests {
         assert!(!is_missing(&one, &one, 0));
     }
 
-    /// 240 px have nine squares of 24 px along a side, 81 in all, of whose middles the shift leads none out of the other photograph. 0.35 of them are
-    /// 28.35 matches.
+    /// 240 px have nine squares of 24 px along a side, 81 in all, of whose middles the shift leads none out of the
+    /// other photograph. 0.35 of them are 28.35 matches.
     #[test]
     fn photographs_of_other_things_do_not_unless_many_match() {
         let (one, other) = (photograph(1), photograph(2));

@@ -1,7 +1,8 @@
-//! Pictures among the photographs that are none: panoramas made of the others, and copies of one of them, reduced or edited.
+//! Pictures among the photographs that are none: panoramas made of the others, and copies of one of them, reduced or
+//! edited.
 //!
-//! They spoil a panorama: the first is bent by its projection and blended already, so that no camera has seen it, copies
-//! add nothing but coarse pixels or other tones.
+//! They spoil a panorama: the first is bent by its projection and blended already, so that no camera has seen it,
+//! copies add nothing but coarse pixels or other tones.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -30,13 +31,15 @@ pub enum StrangerKind {
         /// The photograph's number.
         of: usize,
     },
-    /// It is the photograph `of` itself with other tones, compression or size: everything lies at the same place to a fraction of a pixel.
+    /// It is the photograph `of` itself with other tones, compression or size: everything lies at the same place to a
+    /// fraction of a pixel.
     EditedCopy {
         /// The photograph's number.
         of: usize,
     },
-    /// It shows all that each of `of` shows, and more, on a format that no camera has, as these do, or all of one size; or, on any format, nothing but what they show together, with no more
-    /// detail. Where it shows them, it matches them about as densely as any other.
+    /// It shows all that each of `of` shows, and more, on a format that no camera has, as these do, or all of one size;
+    /// or, on any format, nothing but what they show together, with no more detail. Where it shows them, it matches
+    /// them about as densely as any other.
     Panorama {
         /// At least two photographs' numbers, ascending.
         of: Vec<usize>,
@@ -47,21 +50,22 @@ pub enum StrangerKind {
 const SAME_VIEW: f64 = 0.97;
 /// Share of the matches in the overlap that agree, from which two pictures can be of one exposure: nothing has moved.
 const SAME_EXPOSURE: f64 = 0.9;
-/// A reduced copy is at most this large on a side, in parts of the original: copies of nearly its size are left to the user.
+/// A reduced copy is at most this large on a side, in parts of the original: copies of nearly its size are left to the
+/// user.
 const REDUCED: f64 = 0.9;
-/// Share of a photograph's area from which a panorama shows it whole: a panorama may be cropped, and a homography tells where
-/// the corners lie on a bent one to a few hundredths.
+/// Share of a photograph's area from which a panorama shows it whole: a panorama may be cropped, and a homography tells
+/// where the corners lie on a bent one to a few hundredths.
 const WHOLE: f64 = 0.9;
 /// Share of a photograph's area that a panorama shows of it whose ragged borders were cut off.
 const MOSTLY: f64 = 0.6;
-/// Share of such a panorama that its photographs cover together, at least, and one alone, at most: a photograph that its neighbors
-/// overlap as far is covered by each of them.
+/// Share of such a panorama that its photographs cover together, at least, and one alone, at most: a photograph that
+/// its neighbors overlap as far is covered by each of them.
 const CROPPED_COVERED: f64 = 0.85;
 const COVERED_BY_ONE: f64 = 0.7;
 /// Photographs that a picture must show to be taken for a panorama of them.
 const MIN_SHOWN: usize = 2;
-/// Share of a whole panorama that the photographs it was made of cover. Its empty corners are not covered; what a wider lens has seen
-/// beyond the others is not, either.
+/// Share of a whole panorama that the photographs it was made of cover. Its empty corners are not covered; what a wider
+/// lens has seen beyond the others is not, either.
 const MIN_COVERED: f64 = 0.6;
 /// Width by height of what cameras write, lying: square, large format, four thirds, 35 mm, high definition.
 const CAMERA_FORMATS: [f64; 5] = [1.0, 5.0 / 4.0, 4.0 / 3.0, 3.0 / 2.0, 16.0 / 9.0];
@@ -71,20 +75,22 @@ const FORMAT_TOLERANCE: f64 = 0.015;
 const SAME_SIDE: f64 = 0.01;
 /// A picture of a camera's format is a panorama if its photographs lie in it by this share of their area at least, ...
 const INSIDE: f64 = 0.8;
-/// ... each covers this share of it at most: neighbors in a row that overlap as far have the size of their neighbors, ...
+/// ... each covers this share of it at most: neighbors in a row that overlap as far have the size of their neighbors,
+/// ...
 const PART: f64 = 0.5;
-/// ... together they cover this share of it, short of what a homography errs by on a bent one: a wider lens would have seen something beyond them, or
-/// nothing that they do not show, ...
+/// ... together they cover this share of it, short of what a homography errs by on a bent one: a wider lens would have
+/// seen something beyond them, or nothing that they do not show, ...
 const NOTHING_ELSE: f64 = 0.95;
 /// ... and none is enlarged in it by more than this, as lengths go: leaving it out loses no detail.
 const MOST_ENLARGED: f64 = 1.25;
-/// Least number of matches for the area it shows that a panorama has with its photographs, in the middle, as a share of that with the photograph that it
-/// has most matches with. Where a scene repeats a thing near and far, a photograph that shows it near takes those that show it far for parts of it, by
-/// the matches of that thing alone. Of panoramas put beside their photographs (six sets) it is 0.48 to 1, of two such photographs (of a rendered room with
-/// the same picture on two walls) 0.1; set looking at these.
+/// Least number of matches for the area it shows that a panorama has with its photographs, in the middle, as a share of
+/// that with the photograph that it has most matches with. Where a scene repeats a thing near and far, a photograph
+/// that shows it near takes those that show it far for parts of it, by the matches of that thing alone. Of panoramas
+/// put beside their photographs (six sets) it is 0.48 to 1, of two such photographs (of a rendered room with the same
+/// picture on two walls) 0.1; set looking at these.
 const AS_DENSE: f64 = 0.25;
-/// Median distance of matches from the same place in both, working pixels, up to which two pictures are of one exposure: hands, and wind on a tripod, move a
-/// camera by more between two.
+/// Median distance of matches from the same place in both, working pixels, up to which two pictures are of one
+/// exposure: hands, and wind on a tripod, move a camera by more between two.
 const SAME_PLACE_PX: f64 = 0.2;
 /// Points on a side of the grid by which shares of areas are counted.
 const GRID: usize = 16;
@@ -100,7 +106,8 @@ pub struct StrangersInput<'a> {
     pub by_camera: &'a [bool],
     /// When each was taken, as far as its file says. What was taken at two moments is no copy.
     pub taken: &'a [Option<String>],
-    /// Whether the photographer marked parts of it (masks): such a photograph is meant to stand for itself, beside what it is a copy of.
+    /// Whether the photographer marked parts of it (masks): such a photograph is meant to stand for itself, beside what
+    /// it is a copy of.
     pub marked: &'a [bool],
     /// Whether edited copies are looked for: not where several exposures of a view are to be stitched as they are.
     pub copies: bool,
@@ -108,8 +115,8 @@ pub struct StrangersInput<'a> {
 
 /// The pictures that the pairs show to be none of the scene's photographs, ascending by number.
 ///
-/// Overlaps are looked at by their homographies, of lenses that bend by the one that says nearly the same of their matches. Edited copies are
-/// left where nothing else would overlap.
+/// Overlaps are looked at by their homographies, of lenses that bend by the one that says nearly the same of their
+/// matches. Edited copies are left where nothing else would overlap.
 pub fn find_strangers(input: &StrangersInput) -> Vec<Stranger> {
     let StrangersInput { frames, pairs, .. } = *input;
     let views: Vec<SharedView> = pairs.iter().filter_map(|pair| SharedView::of(pair, input)).collect();
@@ -179,8 +186,8 @@ impl SharedView {
         if photograph == self.a { self.enlarged_in_a * in_files } else { (self.enlarged_in_a * in_files).recip() }
     }
 
-    /// The other photograph, the cells of `photograph` that it shows, and its cells that `photograph` shows; `None` if the
-    /// pair is of others.
+    /// The other photograph, the cells of `photograph` that it shows, and its cells that `photograph` shows; `None` if
+    /// the pair is of others.
     fn seen_from(&self, photograph: usize) -> Option<(usize, &[bool], &[bool])> {
         match photograph {
             one if one == self.a => Some((self.b, &self.of_a, &self.of_b)),
@@ -247,7 +254,8 @@ fn reduced_copies(views: &[SharedView], frames: &[WorkingFrame]) -> BTreeMap<usi
     copies.into_iter().map(|(small, of)| (small, StrangerKind::ReducedCopy { of })).collect()
 }
 
-/// By the number of each edited copy its original: the picture of that exposure with a camera's metadata, of these the largest, of these the first.
+/// By the number of each edited copy its original: the picture of that exposure with a camera's metadata, of these the
+/// largest, of these the first.
 fn edited_copies(
     views: &[SharedView],
     reduced: &BTreeMap<usize, StrangerKind>,
@@ -325,7 +333,8 @@ fn shown_of(
     (is_one(&mostly) && covered >= CROPPED_COVERED).then(|| mostly.into_iter().collect())
 }
 
-/// Whether `picture` has enough matches with the photographs that it shows, for what it shows of them, to be made of them: see [`AS_DENSE`].
+/// Whether `picture` has enough matches with the photographs that it shows, for what it shows of them, to be made of
+/// them: see [`AS_DENSE`].
 fn is_matched_as_densely(picture: usize, shown: &BTreeSet<usize>, views: &[SharedView]) -> bool {
     let of_picture = |view: &SharedView| {
         let (other, of_picture, _) = view.seen_from(picture)?;
@@ -337,8 +346,8 @@ fn is_matched_as_densely(picture: usize, shown: &BTreeSet<usize>, views: &[Share
     middle.is_some_and(|middle| middle >= AS_DENSE * most)
 }
 
-/// The photographs that together show all that `picture` does, with as much detail, and overlap each other without it: it is a panorama of them, or adds no
-/// more than one would. `None` if there are none.
+/// The photographs that together show all that `picture` does, with as much detail, and overlap each other without it:
+/// it is a panorama of them, or adds no more than one would. `None` if there are none.
 fn superfluous_beside(
     picture: usize,
     views: &[SharedView],

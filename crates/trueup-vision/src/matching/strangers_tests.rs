@@ -30,8 +30,8 @@ fn frames(sizes: &[[f64; 2]]) -> Vec<WorkingFrame> {
     sizes.iter().map(frame).collect()
 }
 
-/// Three photographs of a row, and as number 3 a picture of `size` full pixels that begins `left` working pixels left of
-/// the first one.
+/// Three photographs of a row, and as number 3 a picture of `size` full pixels that begins `left` working pixels left
+/// of the first one.
 fn row_and(size: [f64; 2], left: f64) -> Vec<Stranger> {
     let frames = frames(&[[600.0, 400.0], [600.0, 400.0], [600.0, 400.0], size]);
     let pairs = [
@@ -73,8 +73,8 @@ fn a_photograph_of_another_size_in_a_dense_row_is_one() {
     assert_eq!(found(&frames, &pairs), []);
 }
 
-/// 1,215 x 810 is a camera's format: a camera with a wider lens may have seen all of them, and what lies above and below.
-/// Two thirds of each neighbor's view is the middle one's, and each was cropped otherwise.
+/// 1,215 x 810 is a camera's format: a camera with a wider lens may have seen all of them, and what lies above and
+/// below. Two thirds of each neighbor's view is the middle one's, and each was cropped otherwise.
 #[test]
 fn photographs_that_were_cropped_by_hand_are_ones() {
     let frames = frames(&[[560.0, 330.0], [600.0, 350.0], [530.0, 340.0]]);
@@ -95,8 +95,8 @@ fn what_a_camera_can_have_taken_is_a_photograph() {
     assert_eq!(row_and([1215.0, 810.0], 10.0), []);
 }
 
-/// Two rows of two, which together show 900 x 600 in full pixels, and as number 4 a picture of that size in which their lengths are `scale` times
-/// theirs, that begins `left` working pixels left of them.
+/// Two rows of two, which together show 900 x 600 in full pixels, and as number 4 a picture of that size in which their
+/// lengths are `scale` times theirs, that begins `left` working pixels left of them.
 fn block_and(scale: f64, left: f64) -> Vec<Stranger> {
     let corners = [[0.0, 0.0], [150.0, 0.0], [0.0, 100.0], [150.0, 100.0]];
     let mut frames = frames(&[[600.0, 400.0]; 4]);
@@ -119,8 +119,8 @@ fn a_panorama_of_a_cameras_format_shows_nothing_but_its_photographs() {
     assert_eq!(block_and(1.0, 45.0), []);
 }
 
-/// It shows a thing near that four photographs of the other side of the room show far, and matches these by that alone; and a part of what a
-/// fifth one shows, which it matches everywhere.
+/// It shows a thing near that four photographs of the other side of the room show far, and matches these by that alone;
+/// and a part of what a fifth one shows, which it matches everywhere.
 #[test]
 fn a_photograph_of_what_others_show_far_is_one() {
     let mut frames = frames(&[[600.0, 400.0]; 4]);

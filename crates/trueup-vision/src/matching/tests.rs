@@ -348,8 +348,8 @@ fn a_few_matches_elsewhere_in_depth_are_not_believed() {
     assert_eq!([elsewhere(0), elsewhere(7), elsewhere(12)], [0, 0, 12]);
 }
 
-/// A near thing of 12 points, 14 px from where the plane has it: once photograph b shows it there, once it shows the plane, and what looks like the
-/// thing is not.
+/// A near thing of 12 points, 14 px from where the plane has it: once photograph b shows it there, once it shows the
+/// plane, and what looks like the thing is not.
 #[test]
 fn matches_elsewhere_in_depth_are_believed_if_what_surrounds_them_is_found_again() {
     let truth = example_map();
@@ -376,7 +376,8 @@ fn matches_elsewhere_in_depth_are_believed_if_what_surrounds_them_is_found_again
     assert_eq!([elsewhere(true), elsewhere(false)], [12, 0]);
 }
 
-/// Forty points of a plane, sixty before it on something round, and sixty that only look alike: too few agree with the plane alone.
+/// Forty points of a plane, sixty before it on something round, and sixty that only look alike: too few agree with the
+/// plane alone.
 #[test]
 fn what_lies_before_a_plane_joins_a_pair_with_it() {
     let round = |in_a: Vector2<f64>| 20.0 + 60.0 * ((in_a.x - 520.0) / 250.0).powi(2) + 40.0 * (in_a.y / 300.0).sin();
@@ -449,7 +450,8 @@ fn contradictory_input_is_an_error() {
     assert!(matches!(missing, Err(Error::Input { .. })));
 }
 
-/// 40 matches agree with one map, as those of equal things do; each photograph shows 800 features more, which are told by what surrounds them.
+/// 40 matches agree with one map, as those of equal things do; each photograph shows 800 features more, which are told
+/// by what surrounds them.
 #[test]
 fn photographs_of_equal_things_among_others_are_not_joined() {
     let back = Homography(example_map().0.try_inverse().expect("regular"));

@@ -1,16 +1,18 @@
 //! Matches verified on rays: two photographs by one lens that only turned, where no homography holds.
 //!
-//! The focal length, in sides of the photographs, which may differ in size, and two radial terms are unknown. Lenses are tried one after the other, from pinholes to fisheyes; under
-//! each, two matches give the turn. The best are refined on all matches that agree.
+//! The focal length, in sides of the photographs, which may differ in size, and two radial terms are unknown. Lenses
+//! are tried one after the other, from pinholes to fisheyes; under each, two matches give the turn. The best are
+//! refined on all matches that agree.
 //!
 //! # Source
-//! Brown, Hartley and Nistér, "Minimal solutions for panoramic stitching" (2007): two matches suffice for a turn, and their
-//! angle tells whether the lens is right; the cost is MSAC's (Torr and Zisserman, MLESAC, section 4).
+//! Brown, Hartley and Nistér, "Minimal solutions for panoramic stitching" (2007): two matches suffice for a turn, and
+//! their angle tells whether the lens is right; the cost is MSAC's (Torr and Zisserman, MLESAC, section 4).
 //!
 //! # Departures
-//! The lens is taken from a list in place of the roots of a polynomial in three matches: the matches of a pair hardly tell
-//! two neighbors of the list apart, every match judges every lens, and fisheyes need no equation of their own. What the user told of the
-//! lenses is not tried otherwise, and kept: of a lens that is told wholly the turn alone is unknown, but for a little of the focal length.
+//! The lens is taken from a list in place of the roots of a polynomial in three matches: the matches of a pair hardly
+//! tell two neighbors of the list apart, every match judges every lens, and fisheyes need no equation of their own.
+//! What the user told of the lenses is not tried otherwise, and kept: of a lens that is told wholly the turn alone is
+//! unknown, but for a little of the focal length.
 
 use nalgebra::{Matrix2, Matrix3, Matrix6, SMatrix, Vector2, Vector3, Vector6};
 use rand::{Rng, RngExt};
@@ -26,7 +28,8 @@ use super::matched_points::MatchedPoints;
 const SAMPLES: usize = 60;
 /// Turns drawn under a lens at most; a tenth of right matches gives a right turn with a probability of 99.8 %.
 const MOST_SAMPLES: usize = 600;
-/// Turns drawn under all lenses, as far as the two bounds allow: where lenses are told, fewer are tried, and each with more turns.
+/// Turns drawn under all lenses, as far as the two bounds allow: where lenses are told, fewer are tried, and each with
+/// more turns.
 const SAMPLES_IN_ALL: usize = 2400;
 /// Lenses that are refined, the best of those tried.
 const REFINED: usize = 3;
@@ -36,7 +39,8 @@ const ROUGH: f64 = 3.0;
 const STEPS: usize = 15;
 /// Smallest angle between the two rays of a sample, radians.
 const LEAST_ANGLE: f64 = 0.05;
-/// By how much the multiple of the threshold within which matches take part in a refinement shrinks in a step, until it is 1.
+/// By how much the multiple of the threshold within which matches take part in a refinement shrinks in a step, until it
+/// is 1.
 const SHRINKING: f64 = 0.25;
 /// Largest change of the focal length's logarithm in a step.
 const LARGEST_FOCAL_STEP: f64 = 0.2;
@@ -46,11 +50,11 @@ const LARGEST_RADIAL_STEP: f64 = 0.1;
 const RIDGE: f64 = 1e-9;
 /// Pull of the radial terms towards the listed ones, as a standard deviation.
 const RADIAL_SD: f64 = 0.2;
-/// Smallest spread of the agreeing matches across the line they lie along best, in diagonals, one standard deviation: what
-/// lies on one line agrees with many lenses and many turns.
+/// Smallest spread of the agreeing matches across the line they lie along best, in diagonals, one standard deviation:
+/// what lies on one line agrees with many lenses and many turns.
 const LEAST_SPREAD: f64 = 0.02;
-/// Share of the wanted matches that has to agree roughly with a listed lens for it to be refined. Photographs that have nothing
-/// in common stay far below.
+/// Share of the wanted matches that has to agree roughly with a listed lens for it to be refined. Photographs that have
+/// nothing in common stay far below.
 const WORTH_REFINING: f64 = 0.5;
 /// Matches that a lens is judged by at most.
 const JUDGING: usize = 400;
@@ -92,7 +96,8 @@ impl TurnedLens {
         pairs.map(|(&a, &b)| (self.squared_error(a, b) / (limit_px * limit_px)).min(1.0)).sum()
     }
 
-    /// Refined on the matches within shrinking multiples of `inlier_px`: the turn, and of the focal length and of k1, k2 what is `free`.
+    /// Refined on the matches within shrinking multiples of `inlier_px`: the turn, and of the focal length and of k1,
+    /// k2 what is `free`.
     fn refined(mut self, points: &MatchedPoints, free: &FreeIntrinsics, inlier_px: f64) -> Self {
         let start = self;
         for step in 0..STEPS {
@@ -132,7 +137,8 @@ impl TurnedLens {
     }
 }
 
-/// What a refinement may change of the lenses on two photographs, of both alike: the focal length's logarithm, k1 and k2.
+/// What a refinement may change of the lenses on two photographs, of both alike: the focal length's logarithm, k1 and
+/// k2.
 #[derive(Debug, Clone, Copy)]
 struct FreeIntrinsics {
     /// Whose focal length.
@@ -195,7 +201,8 @@ impl FreeIntrinsics {
     }
 }
 
-/// The turned lens that most matches agree with, as far as it is not `told`; `None` if none is found that `wanted` matches agree with.
+/// The turned lens that most matches agree with, as far as it is not `told`; `None` if none is found that `wanted`
+/// matches agree with.
 pub(super) fn find_turned_lens(
     points: &MatchedPoints,
     frames: [&WorkingFrame; 2],

@@ -58,7 +58,8 @@ fn turns_are_found_under_every_lens_among_wrong_matches() {
     }
 }
 
-/// Through a lens of 380 px at 800 x 600 px, of which the second photograph has a copy of five eighths, cut to 500 x 350 px.
+/// Through a lens of 380 px at 800 x 600 px, of which the second photograph has a copy of five eighths, cut to 500 x
+/// 350 px.
 #[test]
 fn photographs_of_different_sizes_have_a_common_lens() {
     let turn = rotation_about_z(0.1) * rotation_about_y(-0.6);

@@ -1,5 +1,5 @@
-//! What was written on photographs: a date, a brand, a frame's ornament at the same place of each, whatever the camera looks at. It matches better
-//! than anything in the scene.
+//! What was written on photographs: a date, a brand, a frame's ornament at the same place of each, whatever the camera
+//! looks at. It matches better than anything in the scene.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,8 @@ use super::putative::PutativeMatch;
 use crate::features::Features;
 use crate::squares::{STILL_PX, Square, featured, square};
 
-/// Largest part of a photograph's room with features that writing takes up. Of two photographs of one view all features stand still, all over it.
+/// Largest part of a photograph's room with features that writing takes up. Of two photographs of one view all features
+/// stand still, all over it.
 const MOST_ROOM: f64 = 0.2;
 /// Frames whose sides differ by no more, relative, are of one size.
 const SAME_SIDE: f64 = 1e-3;
@@ -23,8 +24,8 @@ struct Writing {
 }
 
 impl Writing {
-    /// Those that programs place: in photographs of one size at the same place; in others, as upright ones among those held across, in the same corner,
-    /// as large as it was or as one of the sides makes it.
+    /// Those that programs place: in photographs of one size at the same place; in others, as upright ones among those
+    /// held across, in the same corner, as large as it was or as one of the sides makes it.
     fn all([a, b]: [&WorkingFrame; 2]) -> Vec<Self> {
         let [wider, taller] = [b.width / a.width, b.height / a.height];
         if [wider, taller].iter().all(|ratio| (ratio - 1.0).abs() <= SAME_SIDE) {
@@ -124,7 +125,8 @@ mod tests {
         assert_eq!(without(&[], &Features::default()), Vec::new());
     }
 
-    /// By hand: 100 px from the left and 80 above the lower side, in a photograph 4/3 as high 4/3 as far from both: (133.3, 800 - 106.7).
+    /// By hand: 100 px from the left and 80 above the lower side, in a photograph 4/3 as high 4/3 as far from both:
+    /// (133.3, 800 - 106.7).
     #[test]
     fn writing_of_upright_photographs_is_in_the_same_corner() {
         let features = features();

@@ -18,8 +18,8 @@ pub struct CommonPadding {
 }
 
 impl CommonPadding {
-    /// Looks at all pictures of `size` pixels of a set; `None` where there is none that half of them show, two at least, where it does not end
-    /// along a smooth curve, or not at opposite sides.
+    /// Looks at all pictures of `size` pixels of a set; `None` where there is none that half of them show, two at
+    /// least, where it does not end along a smooth curve, or not at opposite sides.
     pub fn of(pictures: &[&Padding], size: [usize; 2]) -> Option<Self> {
         let depths: Vec<u16> = (0..RAYS)
             .map(|ray| {

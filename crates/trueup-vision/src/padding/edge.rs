@@ -92,7 +92,8 @@ impl Edge {
     }
 }
 
-/// Appends those of the `places` that tell the way from the first to the last one, but for the first: Ramer, Douglas and Peucker's.
+/// Appends those of the `places` that tell the way from the first to the last one, but for the first: Ramer, Douglas
+/// and Peucker's.
 pub(super) fn simplify(places: &[[f64; 2]], simpler: &mut Vec<[f64; 2]>) {
     let [first, inner @ .., last] = places else { return };
     let chord = Edge::through(*first, *last, *first);

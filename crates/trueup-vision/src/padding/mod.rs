@@ -1,5 +1,6 @@
-//! Even parts of a picture beside a photograph that lies askew in it, or whose sides are bent: what turning it level, taking its lens's
-//! bend out, or scanning a print leaves. [`border`](crate::border) knows those that are strips along the sides.
+//! Even parts of a picture beside a photograph that lies askew in it, or whose sides are bent: what turning it level,
+//! taking its lens's bend out, or scanning a print leaves. [`border`](crate::border) knows those that are strips along
+//! the sides.
 
 use serde::{Deserialize, Serialize};
 use trueup_core::outline::Outline;
@@ -40,12 +41,14 @@ const STRAIGHT_PX: f64 = 1.5;
 const MOST: f64 = 0.85;
 /// Most that the depths of two pictures differ along a common outline, in working pixels.
 const SAME_PX: u16 = 2;
-/// Working pixels that the outline is drawn inside of where padding ends, for what compression and scaling spread there.
+/// Working pixels that the outline is drawn inside of where padding ends, for what compression and scaling spread
+/// there.
 const MARGIN_PX: f64 = 2.0;
 /// Least and largest share of the picture that the photograph takes up.
 const OF_PICTURE: std::ops::Range<f64> = 0.5..0.997;
 
-/// How far a picture is even along rays from its border to its middle, in its own pixels; nothing is kept of one whose border is not.
+/// How far a picture is even along rays from its border to its middle, in its own pixels; nothing is kept of one whose
+/// border is not.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Padding {
     /// None, or one for each ray, clockwise from the corner at the left and top.

@@ -16,8 +16,9 @@ pub struct StraightSided {
 }
 
 impl Padding {
-    /// The outline of the photograph in this picture of `size` pixels, where padding ends along four straight lines, one at each
-    /// side: a photograph that was turned, or a print on paper. `None` otherwise: a night above and below a lit street ends along two.
+    /// The outline of the photograph in this picture of `size` pixels, where padding ends along four straight lines,
+    /// one at each side: a photograph that was turned, or a print on paper. `None` otherwise: a night above and below a
+    /// lit street ends along two.
     pub fn quadrilateral(&self, size: [usize; 2]) -> Option<StraightSided> {
         let middle = size.map(|length| 0.5 * length as f64);
         let places: Vec<[f64; 2]> = self.told(size).collect();

@@ -43,8 +43,9 @@ fn wrong(outline: &Outline, is_photograph: impl Fn(f64, f64) -> bool) -> [usize;
 }
 
 proptest! {
-    /// Turned in a picture of its own size, as an editor turns it, or on paper, as it was laid on the scanner: nothing of what is beside
-    /// it is kept but slivers, and of the photograph no more than the margin is lost, of some 1400 px of sides.
+    /// Turned in a picture of its own size, as an editor turns it, or on paper, as it was laid on the scanner: nothing
+    /// of what is beside it is kept but slivers, and of the photograph no more than the margin is lost, of some 1400 px
+    /// of sides.
     #[test]
     fn what_was_turned_is_found(degrees in 1.5..9.0_f64, clockwise: bool, on_paper: bool, white: bool) {
         let degrees = if clockwise { degrees } else { -degrees };

@@ -7,7 +7,8 @@ use super::{Likeness, PairingOptions, all_pairs, ordered};
 /// Photographs after matching.
 #[derive(Debug, Clone, Copy)]
 pub struct Apart<'a> {
-    /// Which of them are joined, the largest group first; a photograph that is joined to no other is a group of its own.
+    /// Which of them are joined, the largest group first; a photograph that is joined to no other is a group of its
+    /// own.
     pub groups: &'a [Vec<usize>],
     /// Whether each takes part.
     pub usable: &'a [bool],
@@ -37,9 +38,9 @@ impl Apart<'_> {
     }
 }
 
-/// The pairs that might join photographs outside of the largest group to others, the smaller index first, ascending: all of them where all pairs are
-/// matched, or those wished for; else, of each photograph, those that it looks most like and that were taken next to it. `likeness` is asked how they
-/// look like each other then.
+/// The pairs that might join photographs outside of the largest group to others, the smaller index first, ascending:
+/// all of them where all pairs are matched, or those wished for; else, of each photograph, those that it looks most
+/// like and that were taken next to it. `likeness` is asked how they look like each other then.
 ///
 /// # Errors
 /// Those of `likeness`.

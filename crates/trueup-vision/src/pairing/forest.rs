@@ -1,11 +1,11 @@
 //! Descriptors of many photographs in small groups of those that look alike, without comparing all with all.
 //!
-//! Each tree halves the descriptors by a hyperplane again and again. A hyperplane stands between two clusters of its descriptors, so
-//! that it seldom parts two that are alike; where one tree parts them, another may not.
+//! Each tree halves the descriptors by a hyperplane again and again. A hyperplane stands between two clusters of its
+//! descriptors, so that it seldom parts two that are alike; where one tree parts them, another may not.
 //!
 //! # Source
-//! Dasgupta and Freund, "Random projection trees and low dimensional manifolds" (2008); Silpa-Anan and Hartley, "Optimised
-//! KD-trees for fast image descriptor matching" (2008), for several trees.
+//! Dasgupta and Freund, "Random projection trees and low dimensional manifolds" (2008); Silpa-Anan and Hartley,
+//! "Optimised KD-trees for fast image descriptor matching" (2008), for several trees.
 //!
 //! # Departures
 //! Directions are those between two clusters (k-means of a sample) instead of random ones: they part fewer neighbors.

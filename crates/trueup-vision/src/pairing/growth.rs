@@ -1,5 +1,5 @@
-//! Overlaps that known overlaps predict: two photographs that overlap a third mostly lie where their homographies put them, and so do two at the
-//! ends of three overlaps in a row.
+//! Overlaps that known overlaps predict: two photographs that overlap a third mostly lie where their homographies put
+//! them, and so do two at the ends of three overlaps in a row.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,10 +14,11 @@ use crate::matching::PredictedOverlap;
 
 /// Places along each side of a photograph, from border to border, that are asked whether the other shows them.
 const PLACES: usize = 10;
-/// How far beyond a photograph's border what it is predicted to show may lie, as a share of its sides: predictions over two homographies are off by
-/// so much where features are few.
+/// How far beyond a photograph's border what it is predicted to show may lie, as a share of its sides: predictions over
+/// two homographies are off by so much where features are few.
 const MARGIN: f64 = 0.05;
-/// Share of a photograph that another one must be predicted to show, margin and all: smaller overlaps are hardly ever verified.
+/// Share of a photograph that another one must be predicted to show, margin and all: smaller overlaps are hardly ever
+/// verified.
 const LEAST_SHARE: f64 = 0.01;
 
 /// The overlaps verified so far.
@@ -33,9 +34,9 @@ impl VerifiedOverlaps {
         self.neighbors.get(&photograph).map_or(0, BTreeMap::len)
     }
 
-    /// Takes in the joined ones of `pairs`, and returns those that are predicted by them and not yet `tried`: the largest
-    /// overlaps first, and none of a photograph that has `most_partners` already. Where they predict none over one photograph, all that are known do
-    /// over two.
+    /// Takes in the joined ones of `pairs`, and returns those that are predicted by them and not yet `tried`: the
+    /// largest overlaps first, and none of a photograph that has `most_partners` already. Where they predict none over
+    /// one photograph, all that are known do over two.
     pub(super) fn grow(
         &mut self,
         pairs: &[PairMatches],
@@ -56,7 +57,8 @@ impl VerifiedOverlaps {
         self.with_room(prediction.over(&all, Prediction::over_two), most_partners)
     }
 
-    /// These pairs, the largest shares first, without those of photographs that have `most_partners`, known or before in the order.
+    /// These pairs, the largest shares first, without those of photographs that have `most_partners`, known or before
+    /// in the order.
     fn with_room(&self, predicted: BTreeMap<(usize, usize), f64>, most_partners: usize) -> Vec<(usize, usize)> {
         let mut predicted: Vec<((usize, usize), f64)> = predicted.into_iter().collect();
         predicted.sort_by(|one, other| other.1.total_cmp(&one.1).then(one.0.cmp(&other.0)));

@@ -16,8 +16,8 @@ use crate::matching::squared_distances;
 
 /// Strongest features of each photograph that take part.
 const COMPARED_FEATURES: usize = 1000;
-/// Distance of two descriptors from which they say nothing, squared; that of a descriptor from the nearest one of another scene
-/// is about as large. (Descriptors have a length of 512.)
+/// Distance of two descriptors from which they say nothing, squared; that of a descriptor from the nearest one of
+/// another scene is about as large. (Descriptors have a length of 512.)
 const UNLIKE: u32 = 350 * 350;
 /// Photographs for which a feature votes: the nearest. A place is seldom seen in more.
 const VOTED_FOR: usize = 16;
@@ -41,7 +41,8 @@ pub struct Likeness(pub(super) Vec<Vec<usize>>);
 /// [`trueup_core::Error::Input`] if features contradict themselves; [`trueup_core::Error::Cancelled`].
 ///
 /// # Source
-/// Brown and Lowe (2007), sections 2 and 3.1: a feature's nearest neighbors among those of all photographs, found by trees.
+/// Brown and Lowe (2007), sections 2 and 3.1: a feature's nearest neighbors among those of all photographs, found by
+/// trees.
 ///
 /// # Departures
 /// More neighbors than their 4 are taken, and weighed: photographs may overlap many others.
@@ -113,8 +114,8 @@ impl<'a> Ballot<'a> {
         Self { descriptors, photograph_of, forest }
     }
 
-    /// Adds what those of a group vote that are of the photographs `voting`, for each of which `votes` counts the votes for
-    /// every photograph. Numbers are added, so that the order of the groups does not matter.
+    /// Adds what those of a group vote that are of the photographs `voting`, for each of which `votes` counts the votes
+    /// for every photograph. Numbers are added, so that the order of the groups does not matter.
     fn vote(&self, group: &[u32], voting: &Range<usize>, votes: &[AtomicU32], scratch: &mut Scratch) {
         let Scratch { distances, near } = scratch;
         let photographs = votes.len() / voting.len().max(1);
@@ -139,8 +140,8 @@ impl<'a> Ballot<'a> {
     }
 }
 
-/// Leaves of squared distances and their photographs the nearest of each photograph, the nearest first, and of these as many
-/// as [`votes_for`] looks at.
+/// Leaves of squared distances and their photographs the nearest of each photograph, the nearest first, and of these as
+/// many as [`votes_for`] looks at.
 fn nearest_of_each(near: &mut Vec<(u32, u32)>) {
     near.sort_unstable();
     let mut kept = 0;

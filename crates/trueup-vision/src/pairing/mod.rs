@@ -1,9 +1,9 @@
 //! Which pairs of photographs are worth matching.
 //!
-//! All pairs of few photographs. Of many, first those whose features are each other's neighbors among those of all photographs
-//! (`likeness`, `forest`), and consecutive ones; then those that the homographies of verified pairs predict to overlap (`growth`); at
-//! last, what might join photographs that are still apart (`groups`). Those that stay apart are looked at again (`apart`). The number of pairs grows with that of the photographs, not with its
-//! square.
+//! All pairs of few photographs. Of many, first those whose features are each other's neighbors among those of all
+//! photographs (`likeness`, `forest`), and consecutive ones; then those that the homographies of verified pairs predict
+//! to overlap (`growth`); at last, what might join photographs that are still apart (`groups`). Those that stay apart
+//! are looked at again (`apart`). The number of pairs grows with that of the photographs, not with its square.
 
 mod apart;
 mod forest;
@@ -27,7 +27,8 @@ use growth::VerifiedOverlaps;
 pub use apart::{Apart, pairs_apart};
 pub use likeness::{Likeness, likeness};
 
-/// Overlaps of a photograph, in multiples of `pairing.neighbors`, from which no more are looked for: they tell nothing new.
+/// Overlaps of a photograph, in multiples of `pairing.neighbors`, from which no more are looked for: they tell nothing
+/// new.
 const PARTNERS_PER_NEIGHBOR: usize = 6;
 /// Pairs tried to join what is apart, at most, as a part of those that all photographs propose of their neighbors.
 const JOINING_SHARE: f64 = 0.5;
@@ -35,11 +36,12 @@ const JOINING_SHARE: f64 = 0.5;
 trueup_core::options! {
     /// Which pairs of photographs are matched.
     pub struct PairingOptions("pairing") {
-        /// All pairs are matched of at most so many photographs; of more, those that look alike, and those that overlaps found
-        /// predict. Raise it if photographs that overlap are left out of a large panorama: the time grows with the square.
+        /// All pairs are matched of at most so many photographs; of more, those that look alike, and those that
+        /// overlaps found predict. Raise it if photographs that overlap are left out of a large panorama: the time
+        /// grows with the square.
         exhaustive_up_to: usize = 8, between(0.0, 100000.0), "photographs", basic;
-        /// For every photograph, the neighbors proposed by their looks; up to six times as many are found from there. Raise it
-        /// for photographs of many rows, each of which overlaps many others.
+        /// For every photograph, the neighbors proposed by their looks; up to six times as many are found from there.
+        /// Raise it for photographs of many rows, each of which overlaps many others.
         neighbors: usize = 5, between(1.0, 1000.0), "photographs";
         /// Whether photographs that follow one another are proposed whatever they look like. Turn it off if their order
         /// says nothing of where they were taken.
@@ -50,12 +52,12 @@ trueup_core::options! {
 /// Proposes pairs to match, in rounds: each builds on what the one before verified.
 ///
 /// # Source
-/// Brown and Lowe (2007), section 3.1; growth along verified overlaps is that of incremental reconstruction (Agarwal, Snavely and
-/// others, "Building Rome in a day", 2009, section 4.2: query expansion).
+/// Brown and Lowe (2007), section 3.1; growth along verified overlaps is that of incremental reconstruction (Agarwal,
+/// Snavely and others, "Building Rome in a day", 2009, section 4.2: query expansion).
 ///
 /// # Departures
-/// Brown and Lowe take the 6 neighbors with most matches; we take 5 to begin with, propose consecutive photographs, which photographers overlap, and let
-/// overlaps found predict the others.
+/// Brown and Lowe take the 6 neighbors with most matches; we take 5 to begin with, propose consecutive photographs,
+/// which photographers overlap, and let overlaps found predict the others.
 #[derive(Debug)]
 pub struct Proposals<'a> {
     frames: &'a [WorkingFrame],
@@ -72,8 +74,8 @@ pub struct Proposals<'a> {
 }
 
 impl<'a> Proposals<'a> {
-    /// Of photographs with these features and frames, which are as many; `likeness` is asked how they look like each other where not
-    /// all pairs are proposed.
+    /// Of photographs with these features and frames, which are as many; `likeness` is asked how they look like each
+    /// other where not all pairs are proposed.
     ///
     /// # Errors
     /// [`trueup_core::Error::Options`]; those of `likeness`.
@@ -104,8 +106,8 @@ impl<'a> Proposals<'a> {
         })
     }
 
-    /// The pairs to match next, the smaller index first, ascending, none that was proposed before; `matched` are those of the round
-    /// before. None when nothing more is worth it.
+    /// The pairs to match next, the smaller index first, ascending, none that was proposed before; `matched` are those
+    /// of the round before. None when nothing more is worth it.
     pub fn next(&mut self, matched: &[PairMatches]) -> Vec<(usize, usize)> {
         for pair in matched.iter().filter(|pair| pair.verdict.is_joined()) {
             self.groups.join(pair.a, pair.b);

@@ -86,7 +86,8 @@ fn overlaps_predict_others_until_none_is_left() {
         assert!(pairs.iter().all(|&pair| tried.insert(pair)), "none twice");
         last = pairs.into_iter().map(|(a, b)| matched((a, b), b - a < 4)).collect();
     }
-    // Neighbors share three quarters, the next half, the third in order a quarter, the fourth a border, which might be more.
+    // Neighbors share three quarters, the next half, the third in order a quarter, the fourth a border, which might be
+    // more.
     let expected: BTreeSet<(usize, usize)> = all_pairs(12).into_iter().filter(|(a, b)| b - a <= 4).collect();
     assert_eq!(tried, expected);
 }

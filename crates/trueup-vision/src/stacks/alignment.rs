@@ -1,13 +1,13 @@
 //! Where a member of a stack lies on its reference, to a part of a pixel.
 //!
-//! The cameras of a hand-held stack turn: a rotation by three angles, and the focal length, which two pictures tell the better the farther
-//! they are apart. They are found by Gauss-Newton steps over pyramids, on the darker exposure and what the brighter one lets expect of
-//! it, so that the exposures need not be known.
+//! The cameras of a hand-held stack turn: a rotation by three angles, and the focal length, which two pictures tell the
+//! better the farther they are apart. They are found by Gauss-Newton steps over pyramids, on the darker exposure and
+//! what the brighter one lets expect of it, so that the exposures need not be known.
 //!
 //! # Source
-//! Lucas and Kanade, "An iterative image registration technique with an application to stereo vision", IJCAI 1981; Baker and Matthews,
-//! "Lucas-Kanade 20 years on: a unifying framework", IJCV 56(3), 2004, forwards compositional; weights of Beaton and Tukey, "The fitting
-//! of power series", Technometrics 16(2), 1974, for what moved.
+//! Lucas and Kanade, "An iterative image registration technique with an application to stereo vision", IJCAI 1981;
+//! Baker and Matthews, "Lucas-Kanade 20 years on: a unifying framework", IJCV 56(3), 2004, forwards compositional;
+//! weights of Beaton and Tukey, "The fitting of power series", Technometrics 16(2), 1974, for what moved.
 
 use nalgebra::{Matrix3, Matrix4, Rotation3, Vector3, Vector4};
 use rayon::prelude::*;
@@ -27,17 +27,20 @@ const COARSEST_PX: usize = 48;
 const MOST_STEPS: usize = 15;
 /// A step that moves no corner by so much, in pixels of its size, is the last.
 const STILL_PX: f64 = 0.005;
-/// Residuals beyond this many standard deviations count for nothing: 95 % as efficient as least squares on normal ones (Beaton and Tukey).
+/// Residuals beyond this many standard deviations count for nothing: 95 % as efficient as least squares on normal ones
+/// (Beaton and Tukey).
 const TUKEY: f64 = 4.685;
 /// Smallest standard deviation of residuals, in levels: rounding to 8 bits alone leaves 0.29, on both exposures 0.41.
 const LEAST_DEVIATION: f64 = 0.4;
-/// Standard deviation of the logarithm of a focal length that nothing tells: most lenses of panoramas see 40 to 90 degrees.
+/// Standard deviation of the logarithm of a focal length that nothing tells: most lenses of panoramas see 40 to 90
+/// degrees.
 const GUESSED_FOCAL_DEVIATION: f64 = 0.4;
 /// The same of one that metadata tell.
 const TOLD_FOCAL_DEVIATION: f64 = 0.05;
 /// A focal length that nothing tells, in longer sides: 50 degrees.
 const GUESSED_FOCAL: f64 = 1.07;
-/// Correlation of details at half the size from which two exposures are aligned: brackets of known cameras reach 0.8 to 0.99.
+/// Correlation of details at half the size from which two exposures are aligned: brackets of known cameras reach 0.8 to
+/// 0.99.
 const ALIGNED: f64 = 0.6;
 /// Share of tiles with detail that must agree then.
 const LEAST_AGREEING_TILES: f64 = 0.6;
@@ -112,7 +115,8 @@ pub fn align(pair: &MemberPair) -> Result<AlignedMember, Unaligned> {
     for (level, (dark, bright)) in sizes.iter().enumerate().rev() {
         let before = turn;
         turn.refine(dark, bright, 0.5_f64.powi(level as i32));
-        // Where hardly anything is not white, small pictures may lead astray; larger ones tell more from where these began.
+        // Where hardly anything is not white, small pictures may lead astray; larger ones tell more from where these
+        // began.
         if !is_near(turn.farthest_px(size)) {
             turn = before;
         }
@@ -297,11 +301,12 @@ impl Turn {
         sums
     }
 
-    /// How the place in the bright picture that belongs to one in the dark picture, both in focal lengths from the middle, moves with the
-    /// logarithm of the focal length.
+    /// How the place in the bright picture that belongs to one in the dark picture, both in focal lengths from the
+    /// middle, moves with the logarithm of the focal length.
     fn by_focal(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let ray = self.rotation * Vector3::new(u, v, 1.0);
-        // A longer focal length leaves the place in the dark picture where it is, so that its ray comes nearer to the axis.
+        // A longer focal length leaves the place in the dark picture where it is, so that its ray comes nearer to the
+        // axis.
         let moved = self.rotation * Vector3::new(-u, -v, 0.0);
         [0, 1].map(|axis| (ray[axis] + moved[axis] - ray[axis] / ray.z * moved.z) / ray.z)
     }

@@ -4,18 +4,20 @@ use trueup_core::color::{ToneRelation, ToneSums, TransferCurve};
 use trueup_core::raster::{LUMA, Raster};
 use trueup_core::statistics::median;
 
-/// Levels from which a sample tells that there is light, but not how much: what cameras and JPEG compression leave of white.
+/// Levels from which a sample tells that there is light, but not how much: what cameras and JPEG compression leave of
+/// white.
 pub(super) const CLIPPED: f32 = 250.0;
 /// Levels up to which a sample tells of no light.
 pub(super) const CRUSHED: f32 = 5.0;
 
-/// Pixels beside a pixel of whose mean its detail is the difference: wide enough for edges that are half a pixel off, and narrow
-/// enough that sky above ground is none.
+/// Pixels beside a pixel of whose mean its detail is the difference: wide enough for edges that are half a pixel off,
+/// and narrow enough that sky above ground is none.
 const DETAIL_RADIUS: usize = 4;
 
 /// Pictures are divided into so many tiles along each side, each of which is asked whether it agrees.
 const TILES: usize = 4;
-/// Root mean square of a tile's detail, in levels, from which it has any: more than compression and noise leave in a small copy.
+/// Root mean square of a tile's detail, in levels, from which it has any: more than compression and noise leave in a
+/// small copy.
 const LEAST_DETAIL: f64 = 1.0;
 /// Share of a tile that both exposures must tell of.
 const LEAST_TILE_SHARE: f64 = 0.05;
@@ -62,8 +64,8 @@ pub(super) fn likeness(dark: &Raster<f32>, predicted: &[f32]) -> Likeness {
     }
 }
 
-/// Differences of the samples of both pictures, `dark` and `predicted`, from the means around them, over what both tell; NaN where
-/// `predicted` is.
+/// Differences of the samples of both pictures, `dark` and `predicted`, from the means around them, over what both
+/// tell; NaN where `predicted` is.
 fn details(dark: &[f32], predicted: &[f32], width: usize) -> Vec<[f32; 2]> {
     let height = dark.len() / width;
     let stride = width + 1;
@@ -101,7 +103,8 @@ fn details(dark: &[f32], predicted: &[f32], width: usize) -> Vec<[f32; 2]> {
     details
 }
 
-/// What `bright`, already in the frame of `dark`, lets expect of it: NaN where it is clipped, and where neither shows any light.
+/// What `bright`, already in the frame of `dark`, lets expect of it: NaN where it is clipped, and where neither shows
+/// any light.
 pub(super) fn expected(dark: &Raster<f32>, bright: &[f32]) -> Option<(ToneRelation, Vec<f32>)> {
     let tells = |dark: f32, bright: f32| bright < CLIPPED && (dark > CRUSHED || bright > CRUSHED);
     let mut sums = ToneSums::default();
@@ -123,12 +126,14 @@ pub(super) fn gray(picture: &Raster<u8>) -> Option<Raster<f32>> {
     Raster::from_data(picture.width(), picture.height(), 1, pixels.iter().map(luma).collect()).ok()
 }
 
-/// Share of the picture in which neither exposure may be black or white for their stops to be those of these places alone: as much as must tell of a view.
+/// Share of the picture in which neither exposure may be black or white for their stops to be those of these places
+/// alone: as much as must tell of a view.
 const LEAST_IN_BOTH: f64 = 0.02;
 
-/// How much brighter the one exposure is, in stops: the median over places that are neither black nor white in either, if there are enough of
-/// them, for what is white says less than it is: at the bright end of a bracket, that of a third of a stop would be a tenth. Otherwise it is that of
-/// places that are neither in the darker one, and is more than that where the brighter one is clipped.
+/// How much brighter the one exposure is, in stops: the median over places that are neither black nor white in either,
+/// if there are enough of them, for what is white says less than it is: at the bright end of a bracket, that of a third
+/// of a stop would be a tenth. Otherwise it is that of places that are neither in the darker one, and is more than that
+/// where the brighter one is clipped.
 pub(super) fn stops_between(dark: &Raster<f32>, bright: &[f32]) -> Option<f64> {
     let light: Vec<f64> = (0..=255).map(|level| TransferCurve::SRGB.linear(f64::from(level) / 255.0)).collect();
     // Levels are within 0 to 255; the cast saturates.

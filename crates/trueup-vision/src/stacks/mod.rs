@@ -1,23 +1,26 @@
 //! Which photographs are stacks: the same view at several exposures, to be one photograph.
 //!
-//! Exposures differ in more than a factor: cameras bend their tones, and clip them. Two of one view are alike in that the brighter of two
-//! places is the brighter one in both, so that one relation of tones, which never falls, makes the one of the other. Where the details
-//! that are left agree, within a small shift, the view is the same (`likeness`, `same_view`). Neighbors of a row agree nowhere but
-//! within the overlap, at shifts that are not searched. What cameras recorded of their exposures has a voice: of one exposure there is no stack,
-//! however the pictures differ, and where both say the same, less of a picture must tell.
+//! Exposures differ in more than a factor: cameras bend their tones, and clip them. Two of one view are alike in that
+//! the brighter of two places is the brighter one in both, so that one relation of tones, which never falls, makes the
+//! one of the other. Where the details that are left agree, within a small shift, the view is the same (`likeness`,
+//! `same_view`). Neighbors of a row agree nowhere but within the overlap, at shifts that are not searched. What cameras
+//! recorded of their exposures has a voice: of one exposure there is no stack, however the pictures differ, and where
+//! both say the same, less of a picture must tell.
 //!
-//! Steps of a bracket may be small: a third of a stop is less than an automatic exposure changes, or an editor. What tells a bracket from two photographs
-//! of one view, or a photograph and its copy, is that a record says so, or that exposures of the run are farther apart; those between
-//! then belong to it, however near, as long as none comes twice.
+//! Steps of a bracket may be small: a third of a stop is less than an automatic exposure changes, or an editor. What
+//! tells a bracket from two photographs of one view, or a photograph and its copy, is that a record says so, or that
+//! exposures of the run are farther apart; those between then belong to it, however near, as long as none comes twice.
 //!
 //! # Source
-//! Debevec and Malik, "Recovering high dynamic range radiance maps from photographs", SIGGRAPH 1997, for what a bracket is; Ward, "Fast,
-//! robust image registration for compositing high dynamic range photographs from handheld exposures", Journal of Graphics Tools 8(2), 2003,
-//! for the search of a small shift in pyramids of pictures that exposures do not change.
+//! Debevec and Malik, "Recovering high dynamic range radiance maps from photographs", SIGGRAPH 1997, for what a bracket
+//! is; Ward, "Fast, robust image registration for compositing high dynamic range photographs from handheld exposures",
+//! Journal of Graphics Tools 8(2), 2003, for the search of a small shift in pyramids of pictures that exposures do not
+//! change.
 //!
 //! # Departures
-//! Ward compares bitmaps above and below the median, which says nothing where most of an exposure is white. The relation of tones is
-//! fitted instead for every shift tried, and where either exposure says nothing, nothing is compared.
+//! Ward compares bitmaps above and below the median, which says nothing where most of an exposure is white. The
+//! relation of tones is fitted instead for every shift tried, and where either exposure says nothing, nothing is
+//! compared.
 
 mod alignment;
 mod likeness;
@@ -40,15 +43,16 @@ use limits::{LEAST_RANGE, LEAST_STEP, MOST_SHIFT, ONE_EXPOSURE, SAME_RECORD};
 use passes::ShotOrder;
 use same_view::{SameView, SmallCopy, same_view};
 
-/// A photograph is compared with so many that follow it: cameras take the darkest and the brightest of a bracket one after the other, which
-/// have next to nothing in common, but the one before or after them has something of both.
+/// A photograph is compared with so many that follow it: cameras take the darkest and the brightest of a bracket one
+/// after the other, which have next to nothing in common, but the one before or after them has something of both.
 const LOOK_AHEAD: usize = 3;
 
-/// Most photographs of a stack that are fused: cameras take nine at most, and sixteen a stop apart range over more than any scene does. Fusing holds all
-/// of them in memory, and takes as much longer as there are more.
+/// Most photographs of a stack that are fused: cameras take nine at most, and sixteen a stop apart range over more than
+/// any scene does. Fusing holds all of them in memory, and takes as much longer as there are more.
 const MOST_MEMBERS: usize = 16;
 
-/// Share of the views that must be stacks for photographs to have been taken in passes: of some, the sky is all that they show, and no details tell of it.
+/// Share of the views that must be stacks for photographs to have been taken in passes: of some, the sky is all that
+/// they show, and no details tell of it.
 const LEAST_STACKED: f64 = 0.6;
 /// Views, the first ones, that tell whether the others are worth a look.
 const PROBED_VIEWS: usize = 3;
@@ -56,8 +60,9 @@ const PROBED_VIEWS: usize = 3;
 trueup_core::choice! {
     /// Which photographs are fused.
     pub enum Fuse {
-        /// Photographs of one view at several exposures, which follow one another or come again with every pass over all views, become one photograph: their light where the panorama is written with
-        /// floating point samples, else a picture.
+        /// Photographs of one view at several exposures, which follow one another or come again with every pass over
+        /// all views, become one photograph: their light where the panorama is written with floating point samples,
+        /// else a picture.
         Auto = "auto",
         /// The same, always their light: for panoramas of which it is not known how they will be written.
         Light = "light",
@@ -69,9 +74,10 @@ trueup_core::choice! {
 trueup_core::options! {
     /// What becomes of photographs of one view at several exposures.
     pub struct StackOptions("stacks") {
-        /// Which photographs are fused before they are stitched: those that show one view at several exposures (a bracket), one after the other or pass by pass.
-        /// Choose light for the light of all exposures in a panorama that is not written with floating point samples, or not yet.
-        /// Choose none to have each of them stitched as it is.
+        /// Which photographs are fused before they are stitched: those that show one view at several exposures (a
+        /// bracket), one after the other or pass by pass. Choose light for the light of all exposures in a panorama
+        /// that is not written with floating point samples, or not yet. Choose none to have each of them stitched as it
+        /// is.
         fuse: Fuse = Fuse::Auto, Allowed::Any, "", basic;
     }
 }
@@ -94,7 +100,8 @@ pub struct FoundStack {
     pub reference: usize,
     /// The others, in their order.
     pub others: Vec<FoundMember>,
-    /// What need not be fused, in their order: exposures that lie closest between others of a stack that has more than enough.
+    /// What need not be fused, in their order: exposures that lie closest between others of a stack that has more than
+    /// enough.
     pub spare: Vec<FoundMember>,
 }
 
@@ -107,12 +114,14 @@ pub struct FoundMember {
     pub stops: f64,
     /// Where it shows a thing, minus where the reference does, as parts of the width.
     pub shift: [f64; 2],
-    /// Whether it shows the same view as another one of the stack whether or not it can be aligned; otherwise, it does if it can.
+    /// Whether it shows the same view as another one of the stack whether or not it can be aligned; otherwise, it does
+    /// if it can.
     pub is_sure: bool,
 }
 
-/// The stacks among `candidates`, in the order of their references: runs of consecutive photographs by one camera that show the same view at exposures of
-/// which no two are alike; or, where few are of such, the same of one after the other pass over all views, each at an exposure of its own.
+/// The stacks among `candidates`, in the order of their references: runs of consecutive photographs by one camera that
+/// show the same view at exposures of which no two are alike; or, where few are of such, the same of one after the
+/// other pass over all views, each at an exposure of its own.
 pub fn find(candidates: &[StackCandidate]) -> Vec<FoundStack> {
     let copies: Vec<Option<SmallCopy>> =
         candidates.par_iter().map(|candidate| SmallCopy::new(candidate.thumbnail?)).collect();
@@ -147,7 +156,8 @@ impl Photographs<'_> {
         Some(self.stacks_in(order)).filter(|found| is_likely(order, found))
     }
 
-    /// The stacks of photographs that may be of one view where they follow one another in `order`, within what it has of one view.
+    /// The stacks of photographs that may be of one view where they follow one another in `order`, within what it has
+    /// of one view.
     fn stacks_in(&self, order: &ShotOrder) -> Vec<FoundStack> {
         let ShotOrder { numbers, of_view } = order;
         let ordered: Vec<StackCandidate> = numbers.iter().map(|&number| self.candidates[number]).collect();
@@ -192,7 +202,8 @@ impl FoundStack {
     }
 }
 
-/// Consecutive photographs that are joined, directly or by others of the run, with where they stand beside the first of them.
+/// Consecutive photographs that are joined, directly or by others of the run, with where they stand beside the first of
+/// them.
 fn runs(count: usize, same: &BTreeMap<(usize, usize), SameView>) -> Vec<Vec<FoundMember>> {
     let mut runs = Vec::new();
     let mut first = 0;
@@ -200,8 +211,8 @@ fn runs(count: usize, same: &BTreeMap<(usize, usize), SameView>) -> Vec<Vec<Foun
         // Whatever the first reaches within the photographs that follow, as long as none between is left out.
         let mut reached: BTreeMap<usize, FoundMember> =
             BTreeMap::from([(first, FoundMember { photograph: first, stops: 0.0, shift: [0.0; 2], is_sure: false })]);
-        // The surest links first; every round joins one photograph. Those before the first are of other runs, also where one that lies between
-        // parted them from these.
+        // The surest links first; every round joins one photograph. Those before the first are of other runs, also
+        // where one that lies between parted them from these.
         let following = same.range((first, first)..);
         while let Some(member) = surest_link(&reached, following.clone()) {
             reached.insert(member.photograph, member);
@@ -276,7 +287,8 @@ fn may_share_a_stack(one: &FoundMember, other: &FoundMember, candidates: &[Stack
     are_two && x.hypot(y) <= 2.0 * MOST_SHIFT
 }
 
-/// Whether what may be one stack shows itself as exposures of one view: two of them are a bracket already, or all of them range far enough.
+/// Whether what may be one stack shows itself as exposures of one view: two of them are a bracket already, or all of
+/// them range far enough.
 fn is_bracket(stack: &[FoundMember], same: &BTreeMap<(usize, usize), SameView>) -> bool {
     let is_of_it = |number: usize| stack.iter().any(|member| member.photograph == number);
     let within = |&(&(a, b), _): &(&(usize, usize), &SameView)| is_of_it(a) && is_of_it(b);
@@ -306,8 +318,8 @@ fn with_reference(stack: &[FoundMember], candidates: &[StackCandidate]) -> Optio
     Some(FoundStack { reference: reference.photograph, others, spare })
 }
 
-/// The numbers of what a stack of more than [`MOST_MEMBERS`] can do without: one after the other the exposure, not the reference, the darkest or the brightest,
-/// that leaves the smallest gap.
+/// The numbers of what a stack of more than [`MOST_MEMBERS`] can do without: one after the other the exposure, not the
+/// reference, the darkest or the brightest, that leaves the smallest gap.
 fn spare(stack: &[FoundMember], reference: usize) -> Vec<usize> {
     let mut kept: Vec<&FoundMember> = stack.iter().collect();
     kept.sort_by(|one, other| one.stops.total_cmp(&other.stops));

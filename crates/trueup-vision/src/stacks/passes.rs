@@ -1,7 +1,7 @@
 //! In which orders the exposures of a scene may have been taken.
 //!
-//! Cameras that bracket take all exposures of a view before it is turned. Who sets them by hand may as well turn once round at the one, and again at the next,
-//! with a panorama head that comes to rest at the same places.
+//! Cameras that bracket take all exposures of a view before it is turned. Who sets them by hand may as well turn once
+//! round at the one, and again at the next, with a panorama head that comes to rest at the same places.
 
 use std::iter::once;
 
@@ -34,8 +34,8 @@ pub(super) fn one_by_one(count: usize) -> ShotOrder {
     ShotOrder { numbers: (0..count).collect(), of_view: count.max(1) }
 }
 
-/// Passes over as many views each, two views at least: each in the direction of the first, or every other one back again. The most passes first: of four, every other two
-/// are two passes as well.
+/// Passes over as many views each, two views at least: each in the direction of the first, or every other one back
+/// again. The most passes first: of four, every other two are two passes as well.
 pub(super) fn orders(count: usize) -> impl Iterator<Item = ShotOrder> {
     let splits = (2..=MOST_PASSES).rev().filter(move |passes| count.is_multiple_of(*passes) && count / passes >= 2);
     splits.flat_map(move |passes| once(in_passes(count, passes, false)).chain(once(in_passes(count, passes, true))))

@@ -16,19 +16,23 @@ const MAY_BE_SAME: f64 = 0.5;
 const SAME_VIEW: f64 = 0.75;
 /// Share of tiles with detail that must agree.
 const LEAST_AGREEING_TILES: f64 = 0.6;
-/// How much brighter, in the mean of its levels, one of two exposures that are far enough apart is at least: half a stop is a factor of 1.17 on
-/// the levels of all places that neither loses. Most photographs that follow one another are told apart by that alone.
+/// How much brighter, in the mean of its levels, one of two exposures that are far enough apart is at least: half a
+/// stop is a factor of 1.17 on the levels of all places that neither loses. Most photographs that follow one another
+/// are told apart by that alone.
 const LEAST_BRIGHTER: f64 = 1.05;
-/// The same of two that were recorded as two exposures: a third of a stop is a factor of 1.11, and of the brightest of a bracket most is white.
+/// The same of two that were recorded as two exposures: a third of a stop is a factor of 1.11, and of the brightest of
+/// a bracket most is white.
 const LEAST_BRIGHTER_RECORDED: f64 = 1.02;
-/// Or so much less dark, in the mean of what its levels lack of white: where most is white, a stop more adds next to nothing to the mean.
+/// Or so much less dark, in the mean of what its levels lack of white: where most is white, a stop more adds next to
+/// nothing to the mean.
 const LEAST_LESS_DARK: f64 = 1.1;
 /// White, in levels.
 const WHITE: f64 = 255.0;
 /// Share of the picture in which both must tell something.
 const LEAST_TOLD: f64 = 0.02;
 
-/// The same where cameras recorded as many stops as the pictures tell: of the brightest of a bracket next to nothing may be left.
+/// The same where cameras recorded as many stops as the pictures tell: of the brightest of a bracket next to nothing
+/// may be left.
 const LEAST_TOLD_RECORDED: f64 = 0.005;
 /// Recorded and seen stops agree if they differ by no more than this ...
 const AGREEING_STOPS: f64 = 1.0;
@@ -69,7 +73,8 @@ pub(super) struct SameView {
     pub(super) shift: [f64; 2],
     /// Correlation of their details.
     pub(super) correlation: f64,
-    /// Whether the two are a bracket by themselves: far enough apart, or recorded as two exposures. Others only join such ones.
+    /// Whether the two are a bracket by themselves: far enough apart, or recorded as two exposures. Others only join
+    /// such ones.
     pub(super) is_bracket: bool,
 }
 
@@ -80,11 +85,12 @@ impl SameView {
     }
 }
 
-/// `None` if `a` and `b`, of one size, do not show the same view, or at the same exposure. `recorded` are the stops by which `b` took more light, if their
-/// cameras recorded it: what contradicts the pictures is none of a bracket, and what differs where the record does not was made later, or is of the light.
+/// `None` if `a` and `b`, of one size, do not show the same view, or at the same exposure. `recorded` are the stops by
+/// which `b` took more light, if their cameras recorded it: what contradicts the pictures is none of a bracket, and
+/// what differs where the record does not was made later, or is of the light.
 ///
-/// Exposures that are nearer than half a stop, as cameras take them by half and third stops, count as well: as a bracket where the record says the same
-/// as the pictures, else as what may join exposures that are farther apart.
+/// Exposures that are nearer than half a stop, as cameras take them by half and third stops, count as well: as a
+/// bracket where the record says the same as the pictures, else as what may join exposures that are farther apart.
 pub(super) fn same_view(a: &SmallCopy, b: &SmallCopy, recorded: Option<f64>) -> Option<SameView> {
     if recorded.is_some_and(|stops| stops.abs() < ONE_EXPOSURE) {
         return None;

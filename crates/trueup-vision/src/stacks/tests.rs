@@ -6,7 +6,8 @@ use super::*;
 const WIDTH: usize = 200;
 const HEIGHT: usize = 150;
 
-/// Light, white being 1, with detail of several sizes that repeats nowhere, at a place in focal lengths from the middle of a scene.
+/// Light, white being 1, with detail of several sizes that repeats nowhere, at a place in focal lengths from the middle
+/// of a scene.
 fn light(x: f64, y: f64) -> f64 {
     let sum: f64 =
         [(0.02, 0.5), (0.06, 1.0), (0.2, 1.5)].iter().map(|(size, much)| much * noise(x / size, y / size)).sum();
@@ -28,7 +29,8 @@ fn noise(x: f64, y: f64) -> f64 {
     row(top) * (1.0 - v) + row(top + 1.0) * v
 }
 
-/// What a camera of focal length 200 px, turned by these angles, records of it at this exposure: by a power of 1/2.2, clipped.
+/// What a camera of focal length 200 px, turned by these angles, records of it at this exposure: by a power of 1/2.2,
+/// clipped.
 fn taken([width, height]: [usize; 2], focal: f64, turn: [f64; 3], exposure: f64) -> Raster<f32> {
     let camera_from_world = Rotation3::from_scaled_axis(Vector3::from(turn));
     let mut picture = Raster::new(width, height, 1);
@@ -105,7 +107,8 @@ fn equal_exposures_other_views_and_other_cameras_are_no_stack() {
     assert_eq!((of([0, 0]), of([0, 1])), (1, 0));
 }
 
-/// A view that comes back after another one was a link to what is no run any more, which the search followed without end.
+/// A view that comes back after another one was a link to what is no run any more, which the search followed without
+/// end.
 #[test]
 fn a_view_that_comes_back_after_another_is_no_stack_and_the_next_one_is() {
     let [near, far] = [[0.0; 3], [0.0, 0.9, 0.0]];
@@ -116,8 +119,8 @@ fn a_view_that_comes_back_after_another_is_no_stack_and_the_next_one_is() {
     assert!(matches!(numbers[..], [(2, 3) | (3, 2)]), "{numbers:?}");
 }
 
-/// A turn that was photographed dark, then light, then between, with the same rests each time, there or there and back; and the same from other places each time,
-/// at one exposure, and with a view in two that does not come again.
+/// A turn that was photographed dark, then light, then between, with the same rests each time, there or there and back;
+/// and the same from other places each time, at one exposure, and with a view in two that does not come again.
 #[test]
 fn exposures_of_one_pass_after_the_other_are_stacks() {
     let exposures = [0.2, 5.0, 1.0];
@@ -159,7 +162,8 @@ fn numbers(stacks: &[FoundStack]) -> Vec<(Vec<usize>, Vec<usize>)> {
     stacks.iter().map(sorted).collect()
 }
 
-/// Two directions at exposures that are so many stops from the middle, with what is recorded of them if it `is_recorded`.
+/// Two directions at exposures that are so many stops from the middle, with what is recorded of them if it
+/// `is_recorded`.
 fn bracketed(stops: &[f64], is_recorded: bool) -> Vec<FoundStack> {
     let shot = |k: usize| {
         let [x, y, z] = HAND[k % HAND.len()];
@@ -175,7 +179,8 @@ fn bracketed(stops: &[f64], is_recorded: bool) -> Vec<FoundStack> {
     find(&thumbnails.iter().enumerate().map(candidate).collect::<Vec<_>>())
 }
 
-/// Every exposure nearer than half a stop to the one before it was the first of another stack, so that brackets of half and third stops were none.
+/// Every exposure nearer than half a stop to the one before it was the first of another stack, so that brackets of half
+/// and third stops were none.
 #[test]
 fn brackets_of_small_steps_are_stacks() {
     let steps =
@@ -215,7 +220,8 @@ fn of_more_exposures_than_are_needed_the_closest_ones_are_spare() {
     }
 }
 
-/// A photograph and copies of it that were made a little brighter and darker, as with a camera's record so without, and one of them twice.
+/// A photograph and copies of it that were made a little brighter and darker, as with a camera's record so without, and
+/// one of them twice.
 #[test]
 fn copies_with_other_tones_are_no_stack() {
     let copies = |exposures: &[f64], recorded: Option<f64>| {
@@ -260,7 +266,8 @@ fn where_an_exposure_comes_again_another_stack_begins() {
     assert_eq!(stacks.iter().map(|stack| stack.others.len()).collect::<Vec<_>>(), [2, 2]);
 }
 
-/// How far from its true place in the member a place of the reference is aligned, seen in the reference: by the homography of the turn, K R K^-1.
+/// How far from its true place in the member a place of the reference is aligned, seen in the reference: by the
+/// homography of the turn, K R K^-1.
 fn off_px(
     aligned: &AlignedMember,
     [width, height]: [usize; 2],
@@ -313,7 +320,8 @@ fn what_shows_something_else_is_not_aligned() {
     assert_eq!(align(&MemberPair { member: &small, ..pair }), Err(Unaligned::NoPicture));
 }
 
-/// All of the member but a tenth is white: from small pictures, which tell next to nothing, the search came away by 30 % of a side.
+/// All of the member but a tenth is white: from small pictures, which tell next to nothing, the search came away by 30
+/// % of a side.
 #[test]
 fn a_member_that_is_nearly_white_is_not_led_astray() {
     let (size, focal) = ([400, 300], 380.0);

@@ -13,13 +13,14 @@ const BEGINNING: u8 = b'.';
 /// Bytes of a file of that name that are looked at: more beginnings than any set has.
 const MOST_LOOKED_AT: u64 = 4096;
 
-/// A set that this program works at. Nobody else does while it lives: the file is locked, and a lock goes with the program that
-/// holds it, however it ends.
+/// A set that this program works at. Nobody else does while it lives: the file is locked, and a lock goes with the
+/// program that holds it, however it ends.
 #[derive(Debug)]
 pub(super) struct Claim {
     path: PathBuf,
     file: File,
-    /// How many times work at the set was begun before, by programs that were killed at it or, where the lock does not hold, may be at it.
+    /// How many times work at the set was begun before, by programs that were killed at it or, where the lock does not
+    /// hold, may be at it.
     begun: u64,
     /// Whether the lock holds: file systems that know none let every program take every set.
     pub(super) is_locked: bool,
@@ -28,7 +29,8 @@ pub(super) struct Claim {
 impl Claim {
     /// Takes the set whose folder this is, which is made if it is not there; `None` if another program works at it.
     ///
-    /// Where the file system knows no locks, every program takes every set: work is done twice then, and comes to the same.
+    /// Where the file system knows no locks, every program takes every set: work is done twice then, and comes to the
+    /// same.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] if a file of that name is there that no batch has written.
@@ -62,8 +64,8 @@ impl Claim {
         Ok(Some(Self { path, file, begun, is_locked }))
     }
 
-    /// How many times work at the set was begun before, and never came to an end. Where the lock does not hold, nothing tells programs that were
-    /// killed from those that are at it: none is counted.
+    /// How many times work at the set was begun before, and never came to an end. Where the lock does not hold, nothing
+    /// tells programs that were killed from those that are at it: none is counted.
     pub(super) fn unended(&self) -> u64 {
         if self.is_locked { self.begun } else { 0 }
     }
@@ -139,8 +141,8 @@ mod tests {
         assert_eq!((unlocked.unended(), unlocked.is_first()), (0, false));
     }
 
-    /// A program opens the file, another takes it away when it is done, a third makes it anew: the first holds the lock of a
-    /// file that is gone.
+    /// A program opens the file, another takes it away when it is done, a third makes it anew: the first holds the lock
+    /// of a file that is gone.
     #[cfg(unix)]
     #[test]
     fn a_file_that_was_taken_away_is_no_claim() {

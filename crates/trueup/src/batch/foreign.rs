@@ -45,9 +45,9 @@ pub(super) fn refuse_over(path: &Path, is_own: impl FnOnce(&[u8]) -> bool) -> Re
     }
 }
 
-/// A file in the `folder` of a set, below the folder `output` of the batch, that is none of its own and may be written over by panoramas
-/// of this `extension`; `None` where there is none, and where the folder cannot be read. Only for a folder at which no work was begun
-/// without an end: nothing tells what of it that left.
+/// A file in the `folder` of a set, below the folder `output` of the batch, that is none of its own and may be written
+/// over by panoramas of this `extension`; `None` where there is none, and where the folder cannot be read. Only for a
+/// folder at which no work was begun without an end: nothing tells what of it that left.
 pub(super) fn in_set(folder: &Path, output: &Path, extension: &str) -> Option<PathBuf> {
     let known = SetRecord::read(folder);
     let of_record = folder.join(names::RECORD);

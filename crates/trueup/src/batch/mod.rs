@@ -1,5 +1,5 @@
-//! A tree of folders stitched, a set of photographs after the other: gone on with after a stop, shared between programs and
-//! machines, and never stopped by one bad set.
+//! A tree of folders stitched, a set of photographs after the other: gone on with after a stop, shared between programs
+//! and machines, and never stopped by one bad set.
 
 mod claim;
 mod foreign;
@@ -108,8 +108,8 @@ impl Batch {
     /// The files of all sets. A set of one of these names fails: its folder would lie where the file does.
     pub const FILES: [&str; 3] = [Self::LINES, Self::TABLE, Self::PAGE];
 
-    /// Refuses a file at `path`, where the batch writes one of its own, that no batch has written, and which `is_own` does not know by its
-    /// first bytes; an empty one has nothing to lose.
+    /// Refuses a file at `path`, where the batch writes one of its own, that no batch has written, and which `is_own`
+    /// does not know by its first bytes; an empty one has nothing to lose.
     ///
     /// # Errors
     /// [`Error::Input`] for such a file, [`Error::Io`] if it cannot be read.
@@ -117,13 +117,13 @@ impl Batch {
         foreign::refuse_over(path, is_own)
     }
 
-    /// Finds the sets of a job. A folder that cannot be read is passed over with the warning `folder-unreadable`, a photograph
-    /// whose name is no UTF-8 with `photograph-name-unreadable`, photographs where the panoramas are to be with
-    /// `output-holds-photographs`.
+    /// Finds the sets of a job. A folder that cannot be read is passed over with the warning `folder-unreadable`, a
+    /// photograph whose name is no UTF-8 with `photograph-name-unreadable`, photographs where the panoramas are to be
+    /// with `output-holds-photographs`.
     ///
     /// # Errors
-    /// [`Error::Input`] if the folder is none, holds no photographs, or is the one for the panoramas; [`Error::Io`] if it cannot be
-    /// read; [`Error::Cancelled`].
+    /// [`Error::Input`] if the folder is none, holds no photographs, or is the one for the panoramas; [`Error::Io`] if
+    /// it cannot be read; [`Error::Cancelled`].
     pub fn find(job: BatchJob, context: &StageContext) -> Result<Self> {
         if encode::same_place(&job.folder, &job.output) {
             let hint = "Choose another folder for the panoramas; it may lie within this one.";
@@ -161,8 +161,8 @@ impl Batch {
         self.positions().filter_map(|position| self.record_of(position))
     }
 
-    /// What became of the set at this position. Of what is kept and what could not be, the later counts: another program may have
-    /// done the set since.
+    /// What became of the set at this position. Of what is kept and what could not be, the later counts: another
+    /// program may have done the set since.
     fn record_of(&self, position: usize) -> Option<SetRecord> {
         let kept = SetRecord::read(&self.sets[position].folder_in(&self.job.output));
         let unkept = self.unkept.lock().unwrap_or_else(PoisonError::into_inner).get(&position).cloned();
@@ -174,21 +174,21 @@ impl Batch {
         self.sets.iter().any(|set| set.name == name)
     }
 
-    /// Stitches the sets that are not done, those last that were begun before and came to no end; `tell` hears of each when its
-    /// record is kept. A set that other programs work at is waited for, and taken over if they are killed: when this returns, all
-    /// sets of the shard are done.
+    /// Stitches the sets that are not done, those last that were begun before and came to no end; `tell` hears of each
+    /// when its record is kept. A set that other programs work at is waited for, and taken over if they are killed:
+    /// when this returns, all sets of the shard are done.
     ///
-    /// A set is done when its record is there. It is done anew only if its photographs, the options that decide panoramas, the
-    /// extension or the version of this program have changed, a file of its panoramas is gone or was cut short, a photograph that
-    /// could not be read can be read by now, it failed for a reason that may pass, or [`BatchJob::retry`] asks for it. A set whose
-    /// folder takes no record, or holds a file that no batch has written where one would come to lie, failed, as long as this `Batch` lives; the
-    /// next run tries it again. Where the file system knows no
-    /// locks, the warning `folder-without-locks` says so.
+    /// A set is done when its record is there. It is done anew only if its photographs, the options that decide
+    /// panoramas, the extension or the version of this program have changed, a file of its panoramas is gone or was cut
+    /// short, a photograph that could not be read can be read by now, it failed for a reason that may pass, or
+    /// [`BatchJob::retry`] asks for it. A set whose folder takes no record, or holds a file that no batch has written
+    /// where one would come to lie, failed, as long as this `Batch` lives; the next run tries it again. Where the file
+    /// system knows no locks, the warning `folder-without-locks` says so.
     ///
     /// # Errors
-    /// [`Error::Options`], [`Error::Unsupported`] for what could be written of no set; [`Error::Input`] if the folder for the
-    /// panoramas cannot be made; [`Error::Io`] if no records can be kept, as on a full disk; [`Error::Cancelled`]; what `tell`
-    /// returns. What goes wrong with a set is in its record instead.
+    /// [`Error::Options`], [`Error::Unsupported`] for what could be written of no set; [`Error::Input`] if the folder
+    /// for the panoramas cannot be made; [`Error::Io`] if no records can be kept, as on a full disk;
+    /// [`Error::Cancelled`]; what `tell` returns. What goes wrong with a set is in its record instead.
     pub fn run<E: From<Error> + Send>(
         &self,
         options: &StitchOptions,
@@ -226,8 +226,8 @@ impl Batch {
         (0..self.sets.len()).filter(|&position| self.job.shard.holds(position))
     }
 
-    /// The same in the order of work: those last that were begun and not ended. One that kills the program is to keep no other
-    /// from being made.
+    /// The same in the order of work: those last that were begun and not ended. One that kills the program is to keep
+    /// no other from being made.
     fn order(&self) -> Vec<usize> {
         let is_begun = |&position: &usize| Claim::is_begun(&self.sets[position].folder_in(&self.job.output));
         let (begun, untouched): (Vec<usize>, Vec<usize>) = self.positions().partition(is_begun);

@@ -43,8 +43,8 @@ pub(super) fn tiles(panorama: &Path) -> Option<PathBuf> {
     Some(panorama.with_file_name(name))
 }
 
-/// Whether a batch may write a file or folder of this name into the folder of a set. Case counts for nothing: there are file
-/// systems that know none.
+/// Whether a batch may write a file or folder of this name into the folder of a set. Case counts for nothing: there are
+/// file systems that know none.
 pub(super) fn is_of_set(name: &str) -> bool {
     let name = name.to_lowercase();
     let has_stem = |stem: &str, extension: &str| {
@@ -82,8 +82,9 @@ pub(super) fn panoramas_in(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The part of a set's name at which the batch writes a file, so that no folder can be there; `is_set` says whether a set has a
-/// name. Folders of photographs may be called anything, as `batch.csv`, or `panorama.jpg` within one that is a set itself.
+/// The part of a set's name at which the batch writes a file, so that no folder can be there; `is_set` says whether a
+/// set has a name. Folders of photographs may be called anything, as `batch.csv`, or `panorama.jpg` within one that is
+/// a set itself.
 pub(super) fn place_of_a_file(set: &str, is_set: impl Fn(&str) -> bool) -> Option<&str> {
     let ends = set.match_indices('/').map(|(end, _)| end).chain([set.len()]);
     ends.map(|end| &set[..end]).find(|place| {

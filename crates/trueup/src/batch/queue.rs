@@ -30,7 +30,8 @@ impl Queue {
         Self(Mutex::new(Waiting { next: sets.into_iter().collect(), ..Waiting::default() }))
     }
 
-    /// The next set; waits where only sets are left that other programs work at. `None` when there is nothing more to do.
+    /// The next set; waits where only sets are left that other programs work at. `None` when there is nothing more to
+    /// do.
     ///
     /// # Errors
     /// [`trueup_core::Error::Cancelled`].

@@ -23,15 +23,15 @@ pub struct SetRecord {
     pub set: String,
     /// How many photographs it has.
     pub photographs: usize,
-    /// What decides its panoramas: the program, the options that were changed, the photographs. Texts and whole numbers only, so that
-    /// what was read is what was written.
+    /// What decides its panoramas: the program, the options that were changed, the photographs. Texts and whole numbers
+    /// only, so that what was read is what was written.
     pub made_of: Value,
     /// When it was done, by the clock of the machine that did it: milliseconds since the beginning of the year 1970.
     pub ended_ms: u64,
     /// What came of it.
     pub outcome: SetOutcome,
-    /// Panoramas that lie in the set's folder and did not come of it now, below the folder of the batch: an earlier attempt made
-    /// them, of other photographs or with other options.
+    /// Panoramas that lie in the set's folder and did not come of it now, below the folder of the batch: an earlier
+    /// attempt made them, of other photographs or with other options.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outdated: Vec<String>,
 }
@@ -40,7 +40,8 @@ pub struct SetRecord {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SetOutcome {
-    /// The summaries ([`crate::Written::summary`]) of its panoramas, at least one; their files below the folder of the batch.
+    /// The summaries ([`crate::Written::summary`]) of its panoramas, at least one; their files below the folder of the
+    /// batch.
     Made(Vec<Value>),
     /// There is none.
     Failed {
@@ -98,7 +99,8 @@ impl SetRecord {
         }
     }
 
-    /// Whether a panorama is one of the set's, of now or of an earlier attempt; `file` is its path below the folder of the batch.
+    /// Whether a panorama is one of the set's, of now or of an earlier attempt; `file` is its path below the folder of
+    /// the batch.
     pub(super) fn lists(&self, file: &str) -> bool {
         self.panoramas().iter().any(|one| one["panorama"] == file) || self.outdated.iter().any(|one| one == file)
     }
@@ -130,8 +132,9 @@ impl SetRecord {
         }
     }
 
-    /// Whether all panoramas are still there with what lies beside them, in the folder of the batch, and none was cut short. A
-    /// panorama that has grown counts as whole: somebody wrote something into it, as a caption, which is not to be lost.
+    /// Whether all panoramas are still there with what lies beside them, in the folder of the batch, and none was cut
+    /// short. A panorama that has grown counts as whole: somebody wrote something into it, as a caption, which is not
+    /// to be lost.
     pub(super) fn files_are_whole(&self, output: &Path) -> bool {
         let is_whole =
             |file: &Value, bytes: u64| file.as_str().is_some_and(|path| has_bytes(&output.join(path), bytes));
@@ -148,8 +151,8 @@ impl SetRecord {
         self.made_of[PHOTOGRAPHS].get(position).is_some_and(|photograph| photograph.get(UNREADABLE).is_some())
     }
 
-    /// Whether what is `made_of` now would come to nothing else than the record's. A photograph that could be read then and cannot
-    /// now would only be missing; one that could not be read then and can now is made use of.
+    /// Whether what is `made_of` now would come to nothing else than the record's. A photograph that could be read then
+    /// and cannot now would only be missing; one that could not be read then and can now is made use of.
     pub(super) fn is_of(&self, made_of: &Value) -> bool {
         let mut now = made_of.clone();
         let before = self.made_of[PHOTOGRAPHS].as_array().map_or(&[][..], Vec::as_slice);
@@ -163,8 +166,8 @@ impl SetRecord {
     }
 }
 
-/// Whether a file is there that has so many bytes at least. Of a panorama of tiles, the bytes are those of all tiles, which are
-/// not counted here: their folder must be there.
+/// Whether a file is there that has so many bytes at least. Of a panorama of tiles, the bytes are those of all tiles,
+/// which are not counted here: their folder must be there.
 fn has_bytes(path: &Path, bytes: u64) -> bool {
     let tiles = names::tiles(path);
     let at_least = if tiles.is_some() { 1 } else { bytes.max(1) };

@@ -1,5 +1,5 @@
-//! Which photographs of a tree of folders may make a panorama together: those of one folder that were taken one soon after
-//! the other.
+//! Which photographs of a tree of folders may make a panorama together: those of one folder that were taken one soon
+//! after the other.
 //!
 //! What overlaps is found out by stitching: a set may make several panoramas, or none.
 
@@ -23,8 +23,9 @@ const NO_UTF8: &str = "its name is no UTF-8";
 /// Photographs that may make a panorama together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PhotographsOfFolder {
-    /// The folder below the one that was looked into, with `/` between folders, and `+2`, `+3` ... behind it for what was taken
-    /// later in the same folder; `.` for the folder itself, `+2` for what was taken later there. No two sets have one name.
+    /// The folder below the one that was looked into, with `/` between folders, and `+2`, `+3` ... behind it for what
+    /// was taken later in the same folder; `.` for the folder itself, `+2` for what was taken later there. No two sets
+    /// have one name.
     pub name: String,
     /// The photographs, in the natural order of their names.
     pub photographs: Vec<PathBuf>,
@@ -42,15 +43,18 @@ impl PhotographsOfFolder {
     }
 }
 
-/// The sets of photographs in `root` and the folders within it, in the natural order of their names. Hidden folders and links to
-/// folders are passed over, as are `except`, where panoramas are written, and pictures that say that they are panoramas. A
-/// folder's photographs are parted where nothing was taken for longer than `gap_seconds`, if all of them say when they were taken.
+/// The sets of photographs in `root` and the folders within it, in the natural order of their names. Hidden folders and
+/// links to folders are passed over, as are `except`, where panoramas are written, and pictures that say that they are
+/// panoramas. A folder's photographs are parted where nothing was taken for longer than `gap_seconds`, if all of them
+/// say when they were taken.
 ///
-/// A folder that cannot be read is passed over with the warning `folder-unreadable`, a photograph whose name is no UTF-8 with
-/// `photograph-name-unreadable`. Where there are photographs in `except`, the warning `output-holds-photographs` says so.
+/// A folder that cannot be read is passed over with the warning `folder-unreadable`, a photograph whose name is no
+/// UTF-8 with `photograph-name-unreadable`. Where there are photographs in `except`, the warning
+/// `output-holds-photographs` says so.
 ///
 /// # Errors
-/// [`Error::Input`] if `root` is no folder, or its name is no UTF-8; [`Error::Io`] if it cannot be read; [`Error::Cancelled`].
+/// [`Error::Input`] if `root` is no folder, or its name is no UTF-8; [`Error::Io`] if it cannot be read;
+/// [`Error::Cancelled`].
 pub(super) fn photograph_sets(
     root: &Path,
     except: &Path,
@@ -153,15 +157,16 @@ impl Folder {
         Ok(found)
     }
 
-    /// The photographs right in it. Folders and pipes may be called like photographs, and are none; a link that leads nowhere was
-    /// meant as one.
+    /// The photographs right in it. Folders and pipes may be called like photographs, and are none; a link that leads
+    /// nowhere was meant as one.
     fn photographs(&self) -> Vec<PathBuf> {
         let mut photographs = source::files(&[self.path.display().to_string()], &InMemory::default());
         photographs.retain(|path| (path.is_file() || !path.exists()) && !source::is_marked_panorama(path));
         photographs
     }
 
-    /// A photograph in it or in a folder within that is not of a batch's making; `None` if there is none, or none that can be found.
+    /// A photograph in it or in a folder within that is not of a batch's making; `None` if there is none, or none that
+    /// can be found.
     ///
     /// # Errors
     /// [`Error::Cancelled`].
@@ -212,8 +217,8 @@ fn parted(taken: &[f64], gap_seconds: f64) -> Vec<Vec<usize>> {
     parts.map(ascending).collect()
 }
 
-/// Gives every part a name of its own: the first of a folder that of the folder, the others a number behind it that makes the
-/// name of no folder.
+/// Gives every part a name of its own: the first of a folder that of the folder, the others a number behind it that
+/// makes the name of no folder.
 fn named(parts: Vec<Part>) -> Vec<PhotographsOfFolder> {
     let mut taken: BTreeSet<String> = parts.iter().map(|part| part.folder.clone()).collect();
     let mut begun = BTreeSet::new();

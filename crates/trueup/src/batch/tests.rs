@@ -203,8 +203,8 @@ fn shards_share_all_sets_and_none_twice() {
     assert!((0..10).all(|position| Shard::WHOLE.holds(position)));
 }
 
-/// A set whose folder takes nothing, one where the batch's own files lie and one where another set's do: they fail, and the others
-/// are made. In the next run, too.
+/// A set whose folder takes nothing, one where the batch's own files lie and one where another set's do: they fail, and
+/// the others are made. In the next run, too.
 #[test]
 fn a_set_that_can_have_no_folder_fails_alone() {
     let desk = tree(&["a", "b", "batch.csv", "b/panorama.jpg", "b/at-work"]);
@@ -298,8 +298,8 @@ fn what_an_earlier_attempt_made_is_told_from_what_is_made_now() {
     assert_eq!((record().outcome, record().outdated.len()), (SetOutcome::Alone, 2));
 }
 
-/// The folder of the batch is that of the set in the root of the tree: what others write there stays, what a killed program left
-/// goes.
+/// The folder of the batch is that of the set in the root of the tree: what others write there stays, what a killed
+/// program left goes.
 #[test]
 fn what_was_half_written_in_the_folder_of_the_batch_goes() {
     let desk = tree(&[""]);

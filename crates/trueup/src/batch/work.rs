@@ -26,9 +26,11 @@ use crate::job::{Outputs, SideOutput, StitchJob};
 use crate::options::StitchOptions;
 use crate::pipeline::memory_of_each;
 
-/// A set that was begun so many times without an end is not begun again: it kills the program, most likely by the memory it takes.
+/// A set that was begun so many times without an end is not begun again: it kills the program, most likely by the
+/// memory it takes.
 const MOST_UNENDED: u64 = 5;
-/// How long another program may take at most from making a temporary file to marking it as its own: a thousand times what it does.
+/// How long another program may take at most from making a temporary file to marking it as its own: a thousand times
+/// what it does.
 const MARKED_WITHIN: Duration = Duration::from_secs(1);
 
 /// What came of looking at a set.
@@ -61,8 +63,8 @@ impl<'a> Work<'a> {
     /// Checks what holds for all sets, and makes the folder for them.
     ///
     /// # Errors
-    /// [`Error::Options`]; [`Error::Unsupported`] if the format is none, or has not what is asked of it; [`Error::Input`] if the
-    /// folder cannot be made.
+    /// [`Error::Options`]; [`Error::Unsupported`] if the format is none, or has not what is asked of it;
+    /// [`Error::Input`] if the folder cannot be made.
     pub(super) fn new(batch: &'a Batch, options: &StitchOptions) -> Result<Self> {
         options.validate()?;
         let job = &batch.job;
@@ -101,8 +103,8 @@ impl<'a> Work<'a> {
         self.batch.sets[position].folder_in(&self.batch.job.output)
     }
 
-    /// Does the set at this position, if it is to be done and nobody else is at it. One whose folder takes nothing failed: its
-    /// record is kept by the batch alone.
+    /// Does the set at this position, if it is to be done and nobody else is at it. One whose folder takes nothing
+    /// failed: its record is kept by the batch alone.
     ///
     /// # Errors
     /// [`Error::Cancelled`], and [`Error::Io`] where no set could be kept.
@@ -131,8 +133,8 @@ impl<'a> Work<'a> {
     /// Does the set at this position in its folder, if it is to be done and nobody else is at it.
     ///
     /// # Errors
-    /// [`Error::Cancelled`], those of making the folder and keeping the record, and [`Error::Input`] for a file that no batch has written
-    /// where one of its own would come to lie.
+    /// [`Error::Cancelled`], those of making the folder and keeping the record, and [`Error::Input`] for a file that no
+    /// batch has written where one of its own would come to lie.
     fn attempt_in_folder(&self, position: usize, context: &StageContext) -> Result<Attempt> {
         let (set, folder) = (&self.batch.sets[position], self.folder_of(position));
         if self.is_done(position) && !Claim::is_begun(&folder) {
@@ -172,8 +174,8 @@ impl<'a> Work<'a> {
         panoramas.map(|path| (path.clone(), written_at(&path))).collect()
     }
 
-    /// What is to be kept of a set now. Of `earlier` panoramas, which were there before, those that are neither gone nor written anew are
-    /// outdated; what this attempt has written before it failed is no earlier one's.
+    /// What is to be kept of a set now. Of `earlier` panoramas, which were there before, those that are neither gone
+    /// nor written anew are outdated; what this attempt has written before it failed is no earlier one's.
     fn record(
         &self,
         position: usize,
@@ -202,15 +204,16 @@ impl<'a> Work<'a> {
     /// Whether a set need not be stitched again.
     fn is_done(&self, position: usize) -> bool {
         let Some(record) = SetRecord::read(&self.folder_of(position)) else { return false };
-        // To open every photograph of an archive in each run takes long, and says something only where one could not be read then.
+        // To open every photograph of an archive in each run takes long, and says something only where one could not be
+        // read then.
         let made_of = || self.made_of(&self.batch.sets[position], |photograph| record.was_unreadable(photograph));
         let is_tried_again = self.failed_before.get(&position) == Some(&record.ended_ms);
         !is_tried_again && record.is_of(&made_of()) && record.files_are_whole(&self.batch.job.output)
     }
 
-    /// What decides the panoramas of a set: the program, the options and the photographs as they lie on the disk. Where the
-    /// tree of folders is mounted decides nothing: machines that share it may differ in that. Whether a photograph can be read is
-    /// found out where `is_opened` says so, by its position.
+    /// What decides the panoramas of a set: the program, the options and the photographs as they lie on the disk. Where
+    /// the tree of folders is mounted decides nothing: machines that share it may differ in that. Whether a photograph
+    /// can be read is found out where `is_opened` says so, by its position.
     fn made_of(&self, set: &PhotographsOfFolder, is_opened: impl Fn(usize) -> bool) -> Value {
         let photograph = |(position, path): (usize, &PathBuf)| {
             let metadata = std::fs::metadata(path).ok();

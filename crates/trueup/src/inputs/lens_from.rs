@@ -1,7 +1,7 @@
 //! The lens of other photographs, as an earlier project, or one of Hugin's, found it, told of the photographs at hand.
 //!
-//! A lens belongs to a camera and a size: it is told of photographs of the same shape, whatever their pixels, that no metadata
-//! tell to be of another camera. What it does aside turns with a photograph that was held upright.
+//! A lens belongs to a camera and a size: it is told of photographs of the same shape, whatever their pixels, that no
+//! metadata tell to be of another camera. What it does aside turns with a photograph that was held upright.
 
 use std::path::Path;
 
@@ -21,8 +21,8 @@ const FARTHEST_CENTER: f64 = 0.25;
 const SAME_SHAPE: f64 = 0.005;
 /// Spread of recorded focal lengths, as a logarithm, up to which they are of one setting: what estimates scatter by.
 const ONE_SETTING: f64 = 0.03;
-/// Difference, as a logarithm, of a zoom's recorded setting from the focal length that a file states; what files state is off by
-/// a few percent.
+/// Difference, as a logarithm, of a zoom's recorded setting from the focal length that a file states; what files state
+/// is off by a few percent.
 const NEAREST_SETTING: f64 = 0.1;
 
 /// The lens of one recorded photograph, for a picture whose longer side is 1, as the sensor saw it.

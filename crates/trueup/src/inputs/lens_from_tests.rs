@@ -11,8 +11,8 @@ fn known(focal: f64) -> KnownLens {
     KnownLens { shape: 1.5, camera: None, focal, lens: PlacedLens { terms, center_px: [0.01, 0.002] } }
 }
 
-/// By hand: a picture of 600 x 400 held upright by a quarter turn clockwise has what lay right of the middle below it, and what
-/// lay below it to the left.
+/// By hand: a picture of 600 x 400 held upright by a quarter turn clockwise has what lay right of the middle below it,
+/// and what lay below it to the left.
 #[test]
 fn a_lens_turns_with_the_photograph_and_grows_with_it() {
     let mut upright = image(400, 600, 6);

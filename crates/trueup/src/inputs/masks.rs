@@ -35,11 +35,12 @@ pub(crate) struct AllMasks {
 }
 
 impl AllMasks {
-    /// Reads the masks that `files` name, of any of `images`; names of pictures in memory come before files. Several of one kind on
-    /// one photograph count together.
+    /// Reads the masks that `files` name, of any of `images`; names of pictures in memory come before files. Several of
+    /// one kind on one photograph count together.
     ///
     /// # Errors
-    /// [`Error::Input`] if a photograph is not there or a mask cannot be read or has another size; [`Error::Cancelled`].
+    /// [`Error::Input`] if a photograph is not there or a mask cannot be read or has another size;
+    /// [`Error::Cancelled`].
     pub(crate) fn read(
         files: &[MaskFile],
         in_memory: &InMemory,
@@ -60,8 +61,9 @@ impl AllMasks {
         Ok(all)
     }
 
-    /// Reads the masks that a project recorded of the photographs `images`, in their order; they are looked up as photographs are:
-    /// beside the project file as recorded, as recorded from the current folder, or beside the project file by their names alone.
+    /// Reads the masks that a project recorded of the photographs `images`, in their order; they are looked up as
+    /// photographs are: beside the project file as recorded, as recorded from the current folder, or beside the project
+    /// file by their names alone.
     ///
     /// # Errors
     /// As [`Self::read`].

@@ -47,11 +47,11 @@ pub struct Inputs {
     pub require_all: bool,
     /// Fail where only one photograph can be used, which is written as it is otherwise.
     pub refuse_single: bool,
-    /// Files that the photographs name and that are passed over, since others among the photographs stand for them: camera raw that was
-    /// developed.
+    /// Files that the photographs name and that are passed over, since others among the photographs stand for them:
+    /// camera raw that was developed.
     pub stood_for: BTreeSet<PathBuf>,
-    /// Files that the photographs name and that cannot be used for a reason which their content alone does not tell: videos that no frames
-    /// could be taken out of.
+    /// Files that the photographs name and that cannot be used for a reason which their content alone does not tell:
+    /// videos that no frames could be taken out of.
     pub unusable: Vec<RejectedSource>,
 }
 

@@ -6,8 +6,8 @@ use trueup_core::called::{Called, any_of};
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
-/// The photograph that a user calls `name`: by name, by path, or by the end of its path, its own or that of another exposure of its
-/// stack; `role` ends the message if there is none, as in "so it cannot be the reference".
+/// The photograph that a user calls `name`: by name, by path, or by the end of its path, its own or that of another
+/// exposure of its stack; `role` ends the message if there is none, as in "so it cannot be the reference".
 ///
 /// # Errors
 /// [`Error::Input`] if there is none, or if it may be any of several.

@@ -45,7 +45,8 @@ use crate::project::record::Project;
 pub struct ComposeJob {
     /// The record of a stitch.
     pub project: Project,
-    /// The folder that the project's file lies in: recorded paths are looked up there first, then from the current folder.
+    /// The folder that the project's file lies in: recorded paths are looked up there first, then from the current
+    /// folder.
     pub project_folder: PathBuf,
     /// A folder with other photographs of the same names (whatever their extensions) and sizes, to be shown instead.
     pub photographs: Option<PathBuf>,
@@ -62,9 +63,10 @@ impl ComposeJob {
     /// photographs, the panorama is the very one that was stitched.
     ///
     /// # Errors
-    /// [`trueup_core::Error::Options`]; [`trueup_core::Error::Unsupported`] if an option of the geometry differs from the recorded one;
-    /// [`trueup_core::Error::Input`] if the project was damaged, photographs are missing or have other sizes, or an output is one of the files
-    /// that are read or recorded; those of composing and writing; [`trueup_core::Error::Cancelled`].
+    /// [`trueup_core::Error::Options`]; [`trueup_core::Error::Unsupported`] if an option of the geometry differs from
+    /// the recorded one; [`trueup_core::Error::Input`] if the project was damaged, photographs are missing or have
+    /// other sizes, or an output is one of the files that are read or recorded; those of composing and writing;
+    /// [`trueup_core::Error::Cancelled`].
     pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Written> {
         options.validate()?;
         options.refuse_other_geometry(&self.project.options)?;
@@ -84,7 +86,8 @@ impl ComposeJob {
         })
     }
 
-    /// Refuses outputs that are among what is read, or among what the panorama was stitched of, though others may be shown instead.
+    /// Refuses outputs that are among what is read, or among what the panorama was stitched of, though others may be
+    /// shown instead.
     fn refuse_over_read(&self) -> Result<()> {
         let masks = self.masks.iter().map(|mask| (mask.file.as_path(), ReadFile::Mask));
         let others = self.photographs.iter().map(|folder| folder.display().to_string());

@@ -28,8 +28,9 @@ const DEVELOPED: &str = "-developed";
 /// How the names of developed photographs end, behind the whole name of the raw one.
 const DEVELOPED_END: &str = ".tif";
 
-/// Has the camera raw that `inputs` name developed, into a folder that is to lie beside the panorama; `None` if there is none, no program is
-/// installed that develops it, or the panorama has no place on the disk: then it is left out with the command that converts it.
+/// Has the camera raw that `inputs` name developed, into a folder that is to lie beside the panorama; `None` if there
+/// is none, no program is installed that develops it, or the panorama has no place on the disk: then it is left out
+/// with the command that converts it.
 ///
 /// # Errors
 /// Those of [`MadeFolder::begin`]; [`Error::Io`]; [`Error::Cancelled`].
@@ -93,7 +94,8 @@ fn named(raw: BTreeSet<&PathBuf>) -> Vec<(&PathBuf, String)> {
     let mut name = |(number, path): (usize, &PathBuf)| {
         let own = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let (mut name, mut prefix) = (own.clone(), number + 1);
-        // Names that differ by their case alone are one on some disks; what one gets in place of its own may be another's.
+        // Names that differ by their case alone are one on some disks; what one gets in place of its own may be
+        // another's.
         while !taken.insert(name.to_lowercase()) {
             name = format!("{prefix}-{own}");
             prefix += 1;

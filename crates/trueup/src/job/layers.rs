@@ -57,8 +57,8 @@ impl Stitcher<'_> {
         encode::write_layers(path, &layers, &metadata, &options, self.context())
     }
 
-    /// Writes which photograph what was `rendered`, composed of `alignment`, shows at every pixel to a PNG; returns its length in
-    /// bytes.
+    /// Writes which photograph what was `rendered`, composed of `alignment`, shows at every pixel to a PNG; returns its
+    /// length in bytes.
     ///
     /// # Errors
     /// [`Error::Unsupported`] if photographs were averaged; those of [`encode::write_labels`].

@@ -1,4 +1,5 @@
-//! A folder beside the panorama, for photographs that are made of inputs which cannot be read themselves: frames of videos, developed camera raw.
+//! A folder beside the panorama, for photographs that are made of inputs which cannot be read themselves: frames of
+//! videos, developed camera raw.
 //!
 //! It takes its place when the panorama is there, and only ever the place of files that an earlier run made.
 
@@ -32,8 +33,8 @@ pub(super) struct WithMade {
     pub(super) made: Option<MadeFolder>,
 }
 
-/// Files that were made for a panorama which is not written yet. Dropped, it is removed with everything in it, and an older folder of its
-/// name stays.
+/// Files that were made for a panorama which is not written yet. Dropped, it is removed with everything in it, and an
+/// older folder of its name stays.
 #[derive(Debug)]
 pub(super) struct MadeFolder {
     /// Where it will be.
@@ -45,8 +46,8 @@ impl MadeFolder {
     /// Begins the folder that is called as the panorama and `end`.
     ///
     /// # Errors
-    /// [`Error::Input`] if an older one holds what is not surely made by this program, one of the `inputs`, or one of the `outputs`, or there
-    /// cannot be such a folder; [`Error::Io`].
+    /// [`Error::Input`] if an older one holds what is not surely made by this program, one of the `inputs`, or one of
+    /// the `outputs`, or there cannot be such a folder; [`Error::Io`].
     pub(super) fn begin(outputs: &Outputs, end: &str, inputs: &Inputs) -> Result<Self> {
         let folder = folder_beside(&outputs.panorama, end);
         refuse_inputs(&folder, inputs)?;
@@ -65,7 +66,8 @@ impl MadeFolder {
         &self.folder
     }
 
-    /// The same inputs where a photograph that was made and is named by the place where it will be is named by the place where it is.
+    /// The same inputs where a photograph that was made and is named by the place where it will be is named by the
+    /// place where it is.
     pub(super) fn named_in(&self, mut inputs: Inputs) -> Inputs {
         if let Reference::Named(name) = &mut inputs.reference {
             self.name_by_place(name);
@@ -84,7 +86,8 @@ impl MadeFolder {
         }
     }
 
-    /// Puts the folder in its place, with the list of what is in it; returns the paths that its files have from now on by those that they had.
+    /// Puts the folder in its place, with the list of what is in it; returns the paths that its files have from now on
+    /// by those that they had.
     fn take_place(self) -> Result<BTreeMap<String, String>> {
         let Self { folder, pending } = self;
         let files = entries(pending.path())?;
@@ -104,11 +107,12 @@ impl MadeFolder {
     }
 }
 
-/// Puts folders in their places, and names their files by these in the records of the panoramas that were written of them. Without a panorama,
-/// nothing takes any place.
+/// Puts folders in their places, and names their files by these in the records of the panoramas that were written of
+/// them. Without a panorama, nothing takes any place.
 ///
 /// # Errors
-/// [`Error::Input`] if the place has come to hold other files; [`Error::Io`]; [`Error::Cancelled`]. The old folder then stays.
+/// [`Error::Input`] if the place has come to hold other files; [`Error::Io`]; [`Error::Cancelled`]. The old folder then
+/// stays.
 pub(super) fn settle(made: Vec<MadeFolder>, written: &mut [Written]) -> Result<()> {
     if written.is_empty() {
         return Ok(());

@@ -142,8 +142,8 @@ impl Outputs {
         }
     }
 
-    /// Panoramas of an earlier run that stand in the row of numbered ones and that this run, of `count` panoramas, has not
-    /// written: `pano-3.jpg` where there are two now. Files that are not by this program end the row.
+    /// Panoramas of an earlier run that stand in the row of numbered ones and that this run, of `count` panoramas, has
+    /// not written: `pano-3.jpg` where there are two now. Files that are not by this program end the row.
     pub(crate) fn stale(&self, count: usize) -> Vec<PathBuf> {
         let first = if count > 1 { count + 1 } else { 1 };
         let numbered = (first..).map(|number| self.numbered(Some(number)).panorama);

@@ -18,7 +18,8 @@ use crate::project::replace::{other_photographs, recorded_photographs};
 pub struct RecordedPanorama<'a> {
     /// The record of a stitch.
     pub project: &'a Project,
-    /// The folder that the project's file lies in: recorded paths are looked up there first, then from the current folder.
+    /// The folder that the project's file lies in: recorded paths are looked up there first, then from the current
+    /// folder.
     pub project_folder: &'a Path,
     /// A folder with other photographs of the same names (whatever their extensions) and sizes, to be shown instead.
     pub photographs: Option<&'a Path>,
@@ -27,13 +28,13 @@ pub struct RecordedPanorama<'a> {
 }
 
 impl Stitcher<'_> {
-    /// The geometry of a recorded panorama over its photographs, arranged by this stitcher's options. Nothing is measured or
-    /// matched.
+    /// The geometry of a recorded panorama over its photographs, arranged by this stitcher's options. Nothing is
+    /// measured or matched.
     ///
     /// # Errors
-    /// [`trueup_core::Error::Options`]; [`trueup_core::Error::Unsupported`] if an option of the geometry differs from the
-    /// recorded one; [`trueup_core::Error::Input`] if the project was damaged, or photographs are missing or have other sizes;
-    /// those of the layout; [`trueup_core::Error::Cancelled`].
+    /// [`trueup_core::Error::Options`]; [`trueup_core::Error::Unsupported`] if an option of the geometry differs from
+    /// the recorded one; [`trueup_core::Error::Input`] if the project was damaged, or photographs are missing or have
+    /// other sizes; those of the layout; [`trueup_core::Error::Cancelled`].
     pub fn reopen(&self, recorded: &RecordedPanorama) -> Result<Alignment> {
         let (options, context) = (self.options(), self.context());
         let project = recorded.project;

@@ -20,8 +20,8 @@ pub(super) enum SideOutputWriter {
     Panorama(fn(&Stitcher, &Alignment, &Rendered, &Path) -> Result<()>),
     /// The aligned photographs, when the panorama is written.
     Photographs(fn(&Stitcher, &Alignment, &Path) -> Result<()>),
-    /// The record, when all else is written: its text. Of what is `known` when all photographs have their places, it is refused before
-    /// anything is written where there can be none.
+    /// The record, when all else is written: its text. Of what is `known` when all photographs have their places, it is
+    /// refused before anything is written where there can be none.
     Record {
         /// The refusal.
         check: fn(known: &Project) -> Result<()>,

@@ -47,12 +47,14 @@ pub struct StitchJob {
 
 impl StitchJob {
     /// Runs the job. Outputs are checked before work starts, written beside their place and renamed. Of videos that
-    /// [`Inputs::photographs`] names, the frames that are needed are taken out into a folder beside the panorama; camera raw is developed into
-    /// another, where a program that does so is installed. These folders take their places when a panorama is written.
+    /// [`Inputs::photographs`] names, the frames that are needed are taken out into a folder beside the panorama;
+    /// camera raw is developed into another, where a program that does so is installed. These folders take their places
+    /// when a panorama is written.
     ///
     /// # Errors
-    /// Those of [`Stitcher::align`] and [`Stitcher::compose`], and those of writing; [`trueup_core::Error::Input`] if the
-    /// output is one of the photographs, or a folder that is made beside it would replace other files. Panoramas already written stay.
+    /// Those of [`Stitcher::align`] and [`Stitcher::compose`], and those of writing; [`trueup_core::Error::Input`] if
+    /// the output is one of the photographs, or a folder that is made beside it would replace other files. Panoramas
+    /// already written stay.
     pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
         options.validate()?;
         self.check(&self.outputs, options)?;
@@ -100,7 +102,8 @@ impl StitchJob {
         if folders.is_empty() {
             return all.map(|(alignment, outputs)| outputs.write(&stitcher, alignment)).collect();
         }
-        // What was made is read where it is now until the last panorama is written, and recorded where it will be: records come last.
+        // What was made is read where it is now until the last panorama is written, and recorded where it will be:
+        // records come last.
         let mut written = Vec::new();
         let whole = all.into_iter().try_for_each(|(alignment, outputs)| {
             written.push(outputs.write_pictures(&stitcher, alignment)?);

@@ -24,8 +24,8 @@ impl Written {
 }
 
 impl Project {
-    /// Its summary as a JSON object, whose fields docs/command-line.md describes: size, photographs, judgement, measures, warnings,
-    /// seconds.
+    /// Its summary as a JSON object, whose fields docs/command-line.md describes: size, photographs, judgement,
+    /// measures, warnings, seconds.
     pub fn summary(&self) -> Value {
         let Self { images, canvas, crop, measures, seconds, reference, .. } = self;
         let names = self.photograph_names();

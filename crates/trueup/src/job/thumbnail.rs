@@ -9,9 +9,9 @@ use trueup_io::{decode, source};
 
 use crate::options::StitchOptions;
 
-/// Writes `photograph`, upright and reduced to at most `max_pixels`, to `place`, whose extension chooses the format; returns its
-/// own width and height after orientation. Of `options`, those of reading photographs are heeded. Colors are written as the
-/// photograph has them, without its profile. Of a JPEG, no more is decoded than that takes.
+/// Writes `photograph`, upright and reduced to at most `max_pixels`, to `place`, whose extension chooses the format;
+/// returns its own width and height after orientation. Of `options`, those of reading photographs are heeded. Colors
+/// are written as the photograph has them, without its profile. Of a JPEG, no more is decoded than that takes.
 ///
 /// # Errors
 /// [`Error::Input`] if it is no photograph that can be read; those of writing; [`Error::Cancelled`].

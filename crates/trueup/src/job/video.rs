@@ -24,11 +24,13 @@ const FRAMES: &str = "-frames";
 /// The folder in that of the frames where those of one video are, until all of them are there.
 const UNDER_WAY: &str = "under-way";
 
-/// Takes the frames that are needed out of the videos that `inputs` name themselves, into a folder that is to lie beside the panorama; `None` if
-/// there is no video. A video that no frames can be taken out of is told in [`Inputs::unusable`].
+/// Takes the frames that are needed out of the videos that `inputs` name themselves, into a folder that is to lie
+/// beside the panorama; `None` if there is no video. A video that no frames can be taken out of is told in
+/// [`Inputs::unusable`].
 ///
 /// # Errors
-/// Those of [`MadeFolder::begin`]; [`Error::Input`] if the panorama has no place on the disk; [`Error::Io`]; [`Error::Cancelled`].
+/// Those of [`MadeFolder::begin`]; [`Error::Input`] if the panorama has no place on the disk; [`Error::Io`];
+/// [`Error::Cancelled`].
 pub(super) fn with_frames(inputs: &Inputs, outputs: &Outputs, context: &StageContext) -> Result<Option<WithMade>> {
     let is_video = |name: &String| inputs.in_memory.get(name).is_none() && video::is_video(Path::new(name));
     let videos: Vec<&String> = inputs.photographs.iter().filter(|name| is_video(name)).collect();
@@ -96,7 +98,8 @@ impl TakenFrames {
     }
 }
 
-/// Takes the frames that are needed out of one video, called by `stem` and their numbers; none of them stays where not all can be taken.
+/// Takes the frames that are needed out of one video, called by `stem` and their numbers; none of them stays where not
+/// all can be taken.
 ///
 /// # Errors
 /// Those of [`video::look_through`] and [`video::take`].

@@ -27,7 +27,8 @@ impl Outputs {
     /// Composes an aligned panorama and writes it and what is wanted beside it.
     ///
     /// # Errors
-    /// Those of [`Stitcher::compose`] and of writing; [`trueup_core::Error::Input`] if a file is one of the photographs or their masks.
+    /// Those of [`Stitcher::compose`] and of writing; [`trueup_core::Error::Input`] if a file is one of the photographs
+    /// or their masks.
     pub fn write(&self, stitcher: &Stitcher, alignment: Alignment) -> Result<Written> {
         let written = self.write_pictures(stitcher, alignment)?;
         written.write_records().map(|()| written)
@@ -44,8 +45,8 @@ impl Outputs {
         self.write_pictures_of(stitcher, alignment, rendered)
     }
 
-    /// Writes a panorama that was `rendered` of `alignment`, and what is wanted beside it. A panorama that is handed over,
-    /// not lent, is let go before layers take its memory.
+    /// Writes a panorama that was `rendered` of `alignment`, and what is wanted beside it. A panorama that is handed
+    /// over, not lent, is let go before layers take its memory.
     ///
     /// # Errors
     /// Those of writing; [`trueup_core::Error::Input`] if a file is one of the photographs or their masks.
@@ -113,8 +114,8 @@ impl Outputs {
         self.refuse_over_recorded(&alignment.project, |path| Some(PathBuf::from(path)))
     }
 
-    /// Refuses to write over what `project` records as read: its photographs, the other exposures of their stacks and their masks, each at the
-    /// `place` of its recorded path. `None` is nowhere.
+    /// Refuses to write over what `project` records as read: its photographs, the other exposures of their stacks and
+    /// their masks, each at the `place` of its recorded path. `None` is nowhere.
     ///
     /// # Errors
     /// [`trueup_core::Error::Input`] that names the file and what it is.
@@ -135,7 +136,8 @@ impl Outputs {
     }
 }
 
-/// Whether a photograph, at `path`, was left out because it is none: a panorama of an earlier run or a part of it, which may be written over.
+/// Whether a photograph, at `path`, was left out because it is none: a panorama of an earlier run or a part of it,
+/// which may be written over.
 fn is_older_output(image: &ImageRecord, path: &Path) -> bool {
     image.status == ImageStatus::LeftOut && source::is_own_output(path)
 }

@@ -1,11 +1,11 @@
 //! What was made once and need not be made again: one memo for every phase.
 //!
-//! A result is known by its [`Key`]: of what it is, what it was made from, and the options of its phase and of those before
-//! it. Nothing else may decide it, and nothing can be forgotten: [`Memo::run`] hands the work just these, and the work is a
-//! function that catches nothing else.
+//! A result is known by its [`Key`]: of what it is, what it was made from, and the options of its phase and of those
+//! before it. Nothing else may decide it, and nothing can be forgotten: [`Memo::run`] hands the work just these, and
+//! the work is a function that catches nothing else.
 //!
-//! Results are kept on the disk ([`PhotographCache`]) between runs, or in memory for experiments that do the same work many
-//! times. They decide how long the work takes, never what comes of it.
+//! Results are kept on the disk ([`PhotographCache`]) between runs, or in memory for experiments that do the same work
+//! many times. They decide how long the work takes, never what comes of it.
 
 mod folder;
 mod key;
@@ -33,8 +33,8 @@ pub(crate) struct Memo<'a> {
 }
 
 impl Memo<'_> {
-    /// The key of a result of this kind, made from `input` by `options`; `None` where nothing is kept on the disk, or the
-    /// input cannot be known again.
+    /// The key of a result of this kind, made from `input` by `options`; `None` where nothing is kept on the disk, or
+    /// the input cannot be known again.
     pub(crate) fn key(&self, kind: Kind, input: Option<KeyMaker>, options: &impl Serialize) -> Option<Key> {
         self.disk?;
         Some(input?.part(&kind.0).part(options).finish())
@@ -71,8 +71,8 @@ impl Memo<'_> {
         Ok(made)
     }
 
-    /// What `work` makes of `input` by `options`, with its findings, unless the disk holds it under `key`, which must say all
-    /// that decides `input` and `options`.
+    /// What `work` makes of `input` by `options`, with its findings, unless the disk holds it under `key`, which must
+    /// say all that decides `input` and `options`.
     ///
     /// # Errors
     /// Those of `work`.
@@ -117,8 +117,8 @@ impl Memo<'_> {
         Ok(made)
     }
 
-    /// The same in memory, where one is at hand; the seconds that the work took when it was done are told each time. `from`
-    /// says what decides the input among all that is done with this memory.
+    /// The same in memory, where one is at hand; the seconds that the work took when it was done are told each time.
+    /// `from` says what decides the input among all that is done with this memory.
     ///
     /// # Errors
     /// Those of `work`.

@@ -45,9 +45,10 @@ impl Edition {
     }
 }
 
-/// The mesh of VPG, GSP and the AANAP compared with them: one similarity for each photograph, vertices carried by moving DLT, undivided cells, the weights
-/// of GSP's authors, no refinement but one that is asked for, and outlines and lines that nothing holds while one draws overlaps together: one similarity
-/// for each photograph leaves no room for lines that stay straight where a neighbor lies under another perspective, and photographs would turn to make it.
+/// The mesh of VPG, GSP and the AANAP compared with them: one similarity for each photograph, vertices carried by
+/// moving DLT, undivided cells, the weights of GSP's authors, no refinement but one that is asked for, and outlines and
+/// lines that nothing holds while one draws overlaps together: one similarity for each photograph leaves no room for
+/// lines that stay straight where a neighbor lies under another perspective, and photographs would turn to make it.
 fn fix_published_mesh(options: &mut AlignOptions) {
     /// Residual weights of the three energies next to an overlap, for cells of 40 working pixels.
     const ALIGNMENT: f64 = 1.0;
@@ -65,8 +66,8 @@ fn fix_published_mesh(options: &mut AlignOptions) {
     options.line_alignment.straightness = 0.0;
 }
 
-/// The guidance of VPG: each photograph's own vanishing points, found without intrinsics, against relative rolls, the divergence
-/// alone for a gate, GSP in three dimensions behind it.
+/// The guidance of VPG: each photograph's own vanishing points, found without intrinsics, against relative rolls, the
+/// divergence alone for a gate, GSP in three dimensions behind it.
 fn fix_published_guidance(options: &mut AlignOptions) {
     options.vanishing.intrinsics = Intrinsics::Unknown;
     let similarity = &mut options.similarity;
@@ -95,8 +96,8 @@ macro_rules! methods {
         }
 
         impl Method {
-            /// What `projection.kind = auto` means under this method: a view chosen for the scene if it is ours, by default
-            /// ("vpg"); of every other method, which is there to be compared, the shape that is its own.
+            /// What `projection.kind = auto` means under this method: a view chosen for the scene if it is ours, by
+            /// default ("vpg"); of every other method, which is there to be compared, the shape that is its own.
             pub(crate) fn chooses_view(self) -> bool {
                 self == Self::Vpg
             }

@@ -36,8 +36,8 @@ pub use method::{Evidence, Method, Structure};
 trueup_core::options! {
     /// What photographs are measured on.
     pub struct WorkingOptions("working") {
-        /// Photographs are measured on a copy reduced to at most this many pixels; the panorama itself is made from the full
-        /// photographs. Raise it for very fine detail or small overlaps; time grows in proportion.
+        /// Photographs are measured on a copy reduced to at most this many pixels; the panorama itself is made from the
+        /// full photographs. Raise it for very fine detail or small overlaps; time grows in proportion.
         pixels: f64 = 480000.0, between(10000.0, 100000000.0), "px";
     }
 }
@@ -45,8 +45,8 @@ trueup_core::options! {
 trueup_core::options! {
     /// Where random choices come from.
     pub struct RandomOptions("random") {
-        /// Every random choice, from the verification of pairs on, derives from this number. Change it to see how much of a
-        /// result is chance.
+        /// Every random choice, from the verification of pairs on, derives from this number. Change it to see how much
+        /// of a result is chance.
         seed: u64 = 0, between(0.0, 9007199254740992.0), "";
     }
 }
@@ -56,11 +56,11 @@ trueup_core::options! {
     pub struct ShapeOptions("stitch") {
         /// How the panorama's shape is found. Choose another one to compare, or for photographs that it serves better.
         method: Method = Method::Vpg, Allowed::Any, "", basic;
-        /// What draws overlapping photographs together. Where things stand twice or lines break at seams, take more than
-        /// auto does: it is slower and shows fewer ghosts.
+        /// What draws overlapping photographs together. Where things stand twice or lines break at seams, take more
+        /// than auto does: it is slower and shows fewer ghosts.
         align: Evidence = Evidence::Auto, Allowed::Any, "", basic;
-        /// What of the photographs' structure is kept, beyond the neighborhoods of grid vertices. Choose lines where long
-        /// edges bend.
+        /// What of the photographs' structure is kept, beyond the neighborhoods of grid vertices. Choose lines where
+        /// long edges bend.
         structure: Structure = Structure::None, Allowed::Any, "";
     }
 }
@@ -68,13 +68,14 @@ trueup_core::options! {
 trueup_core::options! {
     /// What the work may take of the machine. Nothing of it changes the panorama.
     pub struct ResourceOptions("resources") {
-        /// Memory that the work may take; auto is a quarter of the machine's, or more where less is too little. With less, the
-        /// canvas goes to a scratch file and photographs are decoded again. Set it where other programs need theirs.
+        /// Memory that the work may take; auto is a quarter of the machine's, or more where less is too little. With
+        /// less, the canvas goes to a scratch file and photographs are decoded again. Set it where other programs need
+        /// theirs.
         memory: MemoryBudget = MemoryBudget::Auto, Allowed::Any, "", basic;
         /// Folder for the scratch file; empty for the folder of the panorama. Set it where that disk is slow or full.
         scratch: String = String::new(), Allowed::Any, "";
-        /// Size of the photograph cache up to which results are kept, where a folder for it is given; those not used for the
-        /// longest time go first.
+        /// Size of the photograph cache up to which results are kept, where a folder for it is given; those not used
+        /// for the longest time go first.
         cache_bytes: f64 = 4e9, between(0.0, 1e15), "bytes";
     }
 }
@@ -162,8 +163,8 @@ macro_rules! phases {
                 rows
             }
 
-            /// The tables' names, as in `table.option`, each with the phase that its options belong to; `None` for those that
-            /// decide how the work is done and told, but not what comes of it.
+            /// The tables' names, as in `table.option`, each with the phase that its options belong to; `None` for
+            /// those that decide how the work is done and told, but not what comes of it.
             pub fn tables() -> Vec<(&'static str, Option<Phase>)> {
                 vec![$($((<$type>::STAGE, $phase),)*)*]
             }
@@ -260,7 +261,8 @@ impl StitchOptions {
         invalid
     }
 
-    /// The options with those that the method fixes at their values: what the geometry is found with, and what is recorded.
+    /// The options with those that the method fixes at their values: what the geometry is found with, and what is
+    /// recorded.
     ///
     /// ```
     /// let mut options = trueup::StitchOptions::default();
@@ -268,7 +270,8 @@ impl StitchOptions {
     /// assert_eq!(options.fixed_by_method().align.mesh.subdivision, 1);
     /// options.set("mesh.subdivision=3")?;
     /// let refused = options.validate().unwrap_err().to_string();
-    /// assert!(refused.contains("mesh.subdivision = 3 (allowed: 1, which the method vpg-published fixes)"), "{refused}");
+    /// let said = "mesh.subdivision = 3 (allowed: 1, which the method vpg-published fixes)";
+    /// assert!(refused.contains(said), "{refused}");
     /// # Ok::<(), trueup::Error>(())
     /// ```
     #[must_use]
@@ -282,8 +285,8 @@ impl StitchOptions {
         fixed
     }
 
-    /// Options that were changed to another value than the method fixes them at. Those at their defaults pass: they were not
-    /// asked for.
+    /// Options that were changed to another value than the method fixes them at. Those at their defaults pass: they
+    /// were not asked for.
     fn contradicting_the_method(&self) -> Vec<InvalidOption> {
         let fixed = self.fixed_by_method();
         if fixed == *self {
@@ -317,8 +320,8 @@ impl StitchOptions {
         if invalid.is_empty() { Ok(()) } else { Err(Error::Options(invalid)) }
     }
 
-    /// Whether photographs are found, measured and matched by these options as by `other`, so that what was matched by the
-    /// one can be aligned by the other.
+    /// Whether photographs are found, measured and matched by these options as by `other`, so that what was matched by
+    /// the one can be aligned by the other.
     pub fn matches_alike(&self, other: &Self) -> bool {
         let told = |options: &Self| (options.align.cameras.lens, options.align.cameras.fov);
         self.measure == other.measure && self.matching == other.matching && told(self) == told(other)
@@ -343,8 +346,8 @@ impl StitchOptions {
         })
     }
 
-    /// The options, `table.option`, of the phases up to the geometry in which these options differ from `recorded` ones: a
-    /// project records the geometry once and for all.
+    /// The options, `table.option`, of the phases up to the geometry in which these options differ from `recorded`
+    /// ones: a project records the geometry once and for all.
     ///
     /// # Errors
     /// [`Error::Input`] if options cannot be written (never).
@@ -391,8 +394,8 @@ mod tests {
         assert!(refused.contains("similarity.rejection"), "{refused}");
     }
 
-    /// What a published method fixes is no default of ours under another name: whoever changes a default sees here what the
-    /// publication has.
+    /// What a published method fixes is no default of ours under another name: whoever changes a default sees here what
+    /// the publication has.
     #[test]
     fn published_methods_fix_the_published_values() {
         let of = |method: &str| {

@@ -63,7 +63,8 @@ impl StitchOptions {
         Ok(())
     }
 
-    /// The line of the first option in a TOML text that cannot have its value there, where it is the only one that changes.
+    /// The line of the first option in a TOML text that cannot have its value there, where it is the only one that
+    /// changes.
     fn line_of_wrong_type(&self, text: &str) -> Option<usize> {
         let (given, own): (toml::Table, _) = (text.parse().ok()?, self.to_table().ok()?);
         let options = given.iter().filter_map(|(stage, values)| Some((stage, values.as_table()?)));
@@ -135,8 +136,8 @@ impl StitchOptions {
         Ok(changed.collect())
     }
 
-    /// Brings options as a project of an earlier version recorded them up to date: those that have another name by now get
-    /// it, those that are fixed at the recorded value by now are dropped.
+    /// Brings options as a project of an earlier version recorded them up to date: those that have another name by now
+    /// get it, those that are fixed at the recorded value by now are dropped.
     ///
     /// # Errors
     /// [`Error::Input`] if one is fixed at another value by now.

@@ -52,13 +52,13 @@ pub(crate) struct ArrangeInput {
 /// A canvas, and how it came about.
 #[derive(Debug, Clone)]
 pub(crate) struct Arrangement {
-    /// Every photograph once in the plane of the mesh, in pixels of the canvas if that is the mesh's; for measures, exposure
-    /// and the record.
+    /// Every photograph once in the plane of the mesh, in pixels of the canvas if that is the mesh's; for measures,
+    /// exposure and the record.
     pub plane: CanvasLayout,
     /// What is composed.
     pub drawn: CanvasLayout,
-    /// Every photograph once in pixels of the canvas `drawn`, in the order of `plane`: the panorama as it is measured and, but
-    /// for the crop, recorded. Vertices beyond what a projection can show are NaN.
+    /// Every photograph once in pixels of the canvas `drawn`, in the order of `plane`: the panorama as it is measured
+    /// and, but for the crop, recorded. Vertices beyond what a projection can show are NaN.
     pub delivered: Vec<GridMesh>,
     /// How directions were drawn; `None` for the mesh.
     pub projection: Option<ProjectionRecord>,
@@ -111,8 +111,8 @@ impl ArrangeInput {
         Self { placed, reference: component.reference, cameras, dominant, period, by_cameras, is_flat_scene }
     }
 
-    /// What a project knows of the photographs used, whose grids are `placed` in its order: composing from the record starts
-    /// here.
+    /// What a project knows of the photographs used, whose grids are `placed` in its order: composing from the record
+    /// starts here.
     pub(crate) fn of_project(placed: Vec<Placed>, reference: usize, project: &Project) -> Self {
         let camera = |record: &ImageRecord| record.camera(record.level_rotation()?);
         let is_flat_scene = project.flat_scene.is_some();
@@ -151,8 +151,8 @@ fn lay_out(input: ArrangeInput, options: &ArrangeOptions, memo: Memo, context: &
     on_plane(Plane { layout: plane, reference, cameras, dominant, by_cameras, is_flat_scene }, options, memo, context)
 }
 
-/// Arranges the photographs of `project`, recorded on `plane`, as the options ask: with the recorded options as they were
-/// recorded, to the last bit.
+/// Arranges the photographs of `project`, recorded on `plane`, as the options ask: with the recorded options as they
+/// were recorded, to the last bit.
 ///
 /// # Errors
 /// As [`run`].
@@ -286,7 +286,8 @@ struct Unrolled<'a> {
     period: Option<f64>,
 }
 
-/// How far the photographs give way, whatever they are drawn on: unless an earlier run found it for the same grids and cameras.
+/// How far the photographs give way, whatever they are drawn on: unless an earlier run found it for the same grids and
+/// cameras.
 fn parallax_shifts(
     input: &Unrolled,
     max_parallax: f64,
@@ -411,7 +412,8 @@ fn share_outside(grids: &[&GridMesh], size: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Of five columns of vertices the first three lie on one grid, the third and fourth on the other, and the last on none.
+    /// Of five columns of vertices the first three lie on one grid, the third and fourth on the other, and the last on
+    /// none.
     #[test]
     fn a_photograph_on_both_sides_of_a_view_is_shown_on_each() {
         let whole = GridMesh::regular(40.0, 10.0, 10.0);

@@ -1,5 +1,5 @@
-//! The borders phase: photographs that lie inside an even border in their files, or askew in them, are measured again without what lies
-//! beside them.
+//! The borders phase: photographs that lie inside an even border in their files, or askew in them, are measured again
+//! without what lies beside them.
 
 use trueup_core::diagnostics::{Diagnostic, Reported, Subject, add_seconds};
 use trueup_core::inset::Inset;
@@ -16,8 +16,8 @@ use super::shelf::Shelf;
 use crate::memo::Memo;
 use crate::options::StitchOptions;
 
-/// Most that the borders of pictures of one size differ to be one and the same, in working pixels: a dark place or a bright one beside a
-/// border hides where it ends.
+/// Most that the borders of pictures of one size differ to be one and the same, in working pixels: a dark place or a
+/// bright one beside a border hides where it ends.
 const SAME_BORDER: usize = 2;
 
 /// What the phase works on: the photographs as they were given, and what was told of them.
@@ -58,8 +58,8 @@ impl Beside {
     }
 }
 
-/// Takes what lies beside them from the photographs inside a border, or askew, and measures them again; without any, everything stays as it
-/// was.
+/// Takes what lies beside them from the photographs inside a border, or askew, and measures them again; without any,
+/// everything stays as it was.
 ///
 /// # Errors
 /// [`trueup_core::Error::Limits`]; [`trueup_core::Error::Cancelled`].
@@ -137,8 +137,8 @@ fn outlines(measured: &[&Measured]) -> Vec<Option<Outline>> {
     paddings.iter().zip(alone).map(of_one).collect()
 }
 
-/// The borders of pictures of one size, which often have one in common. Half of them tell it; where it ends beside a sky as bright, or a
-/// night as dark, as itself, the others do.
+/// The borders of pictures of one size, which often have one in common. Half of them tell it; where it ends beside a
+/// sky as bright, or a night as dark, as itself, the others do.
 fn of_one_size(borders: &[EvenBorder]) -> Vec<Inset> {
     let common: [Option<usize>; 4] = std::array::from_fn(|side| {
         let mut widths: Vec<usize> =

@@ -1,5 +1,5 @@
-//! How much memory the work may take, and how the stages divide it. The division decides what is kept and what is done at
-//! once, never what comes out.
+//! How much memory the work may take, and how the stages divide it. The division decides what is kept and what is done
+//! at once, never what comes out.
 
 use trueup_compose::render::Resources;
 use trueup_core::memory::{MemoryBudget, needed_in_words, room_in_words};
@@ -11,21 +11,23 @@ use trueup_io::decode::FilePhotographs;
 use super::machine::{self, MachineMemory};
 use crate::options::ResourceOptions;
 
-/// What the program takes beside what is counted: itself, features and matches, meshes, and what the allocator cannot give
-/// back. A whole stitch of five small photographs peaks at 111 MB, of which their pixels are a part.
+/// What the program takes beside what is counted: itself, features and matches, meshes, and what the allocator cannot
+/// give back. A whole stitch of five small photographs peaks at 111 MB, of which their pixels are a part.
 const PROGRAM_BYTES: usize = 96_000_000;
 
 /// The share of the machine's memory that is taken without being asked for less or more: 1 / 4.
 const AUTOMATIC_SHARE: u64 = 4;
 
-/// The share of the machine's memory that is divided among pieces of work that are done at once, without being asked for less or
-/// more: 1 / 2. Each may take no more than its part, while a single one may where less is too little.
+/// The share of the machine's memory that is divided among pieces of work that are done at once, without being asked
+/// for less or more: 1 / 2. Each may take no more than its part, while a single one may where less is too little.
 const SHARE_OF_SEVERAL: u64 = 2;
 
-/// Bytes that finding features takes per working pixel: the levels of the scale space of a photograph of twice the size.
+/// Bytes that finding features takes per working pixel: the levels of the scale space of a photograph of twice the
+/// size.
 const FEATURE_BYTES: f64 = 240.0;
 
-/// Working pixels of a photograph that are counted at least, where as many are allowed: of small ones, what is taken beside their pixels is more than these.
+/// Working pixels of a photograph that are counted at least, where as many are allowed: of small ones, what is taken
+/// beside their pixels is more than these.
 const LEAST_COUNTED: f64 = 480_000.0;
 
 /// Bytes of a pixel of a photograph that was reduced to its working size, with what its thumbnail takes.
@@ -34,15 +36,16 @@ const REDUCED_BYTES: f64 = 4.5;
 /// Bytes of a photograph's pixel that was not decoded yet.
 const PIXEL_BYTES: usize = 4;
 
-/// A photograph on its way into memory takes this many times its size: what the decoder holds beside its pixels, and its
-/// copy when it is turned upright.
+/// A photograph on its way into memory takes this many times its size: what the decoder holds beside its pixels, and
+/// its copy when it is turned upright.
 const DECODING: usize = 2;
 
-/// Bytes of a photograph's features, as detailed ones have: 5,000 descriptors, of 170 bytes with their points, and what surrounds them.
+/// Bytes of a photograph's features, as detailed ones have: 5,000 descriptors, of 170 bytes with their points, and what
+/// surrounds them.
 const FEATURES_OF_ONE: usize = 1_330_000;
 
-/// The part of the memory that features may have at least until they are matched, whatever measuring leaves: 1 / 16, and of what is counted for
-/// the program a little.
+/// The part of the memory that features may have at least until they are matched, whatever measuring leaves: 1 / 16,
+/// and of what is counted for the program a little.
 const FEATURE_PART: usize = 16;
 
 /// With room for so many photographs per thread, no more are worked at at once.
@@ -95,7 +98,8 @@ impl Budget {
         Self { memory: bytes(memory), ceiling: bytes(ceiling), advice }
     }
 
-    /// How many photographs may be measured at once on copies of `working_pixels`, and how many bytes of them kept until they are composed.
+    /// How many photographs may be measured at once on copies of `working_pixels`, and how many bytes of them kept
+    /// until they are composed.
     ///
     /// # Errors
     /// [`Error::Limits`] with the numbers if the largest is too large to be measured alone.
@@ -111,7 +115,8 @@ impl Budget {
         // Photographs are made smaller for measuring, never larger.
         let most_pixels = ((bytes(largest) / PIXEL_BYTES) as f64).max(LEAST_COUNTED);
         let working_pixels = working_pixels.min(most_pixels);
-        // One after the other: what is not kept of a photograph is let go before features are found in its working copy.
+        // One after the other: what is not kept of a photograph is let go before features are found in its working
+        // copy.
         let reduced = (REDUCED_BYTES * working_pixels) as usize;
         let features = ((FEATURE_BYTES * working_pixels) as usize).saturating_add(reduced);
         let decoding = bytes(largest).saturating_mul(DECODING).saturating_add(photographs.decoding_surplus());
@@ -136,9 +141,9 @@ impl Budget {
         Ok(Measuring { at_once, kept_bytes, held_features })
     }
 
-    /// What composing may take beside what the program takes already, and what the decoders of some photographs take: every thread's, or
-    /// where that is too much, one's. What is refused depends on the photographs alone: what is known of many leaves less room,
-    /// but never none.
+    /// What composing may take beside what the program takes already, and what the decoders of some photographs take:
+    /// every thread's, or where that is too much, one's. What is refused depends on the photographs alone: what is
+    /// known of many leaves less room, but never none.
     pub(super) fn composing<'a>(&self, photographs: &FilePhotographs, scratch: &'a dyn ScratchSpace) -> Resources<'a> {
         let taken = machine::taken().and_then(|bytes| usize::try_from(bytes).ok()).unwrap_or(0);
         let counted = PROGRAM_BYTES.saturating_add(photographs.kept_bytes());

@@ -1,4 +1,5 @@
-//! The carrier phase: what photographs show of what carries the camera, a bonnet or the legs of a drone, is taken from what is known of them.
+//! The carrier phase: what photographs show of what carries the camera, a bonnet or the legs of a drone, is taken from
+//! what is known of them.
 
 use trueup_core::carrier::CarrierParts;
 use trueup_core::diagnostics::{Diagnostic, Subject};
@@ -33,10 +34,12 @@ pub(super) struct CarrierLeftOut {
     pub measurements: Measurements,
 }
 
-/// Finds where photographs show the carrier, and forgets what was measured there; without one, everything stays as it was.
+/// Finds where photographs show the carrier, and forgets what was measured there; without one, everything stays as it
+/// was.
 ///
 /// # Errors
-/// [`trueup_core::Error::Io`] if features cannot be read; [`trueup_core::Error::Limits`]; [`trueup_core::Error::Cancelled`].
+/// [`trueup_core::Error::Io`] if features cannot be read; [`trueup_core::Error::Limits`];
+/// [`trueup_core::Error::Cancelled`].
 pub(super) fn run(input: CarrierInput, options: &StitchOptions, context: &StageContext) -> Result<CarrierLeftOut> {
     let CarrierInput { set, mut measurements, shelf } = input;
     let found = context.time(STAGE, || found(&set.images, &measurements, context))?;

@@ -1,4 +1,5 @@
-//! What is coarse in photographs, for those that are looked at again: found when it is asked for, from what is kept of them.
+//! What is coarse in photographs, for those that are looked at again: found when it is asked for, from what is kept of
+//! them.
 
 use std::borrow::Cow;
 use std::fmt;

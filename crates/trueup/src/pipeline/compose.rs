@@ -112,7 +112,8 @@ pub(crate) struct ComposeInput<'a> {
     pub destination: Option<Destination<'a>>,
 }
 
-/// A file that a panorama is to be written to. Formats limit its sides, which is found before the panorama is composed for nothing.
+/// A file that a panorama is to be written to. Formats limit its sides, which is found before the panorama is composed
+/// for nothing.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Destination<'a> {
     pub path: &'a Path,

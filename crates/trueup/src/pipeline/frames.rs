@@ -1,8 +1,9 @@
 //! Frames of a video that lie in a folder as files: of many that show nearly the same, those that a panorama needs.
 //!
-//! No folder of photographs may lose one. Files are taken for frames only if all of this holds: there are thirty or more of one format and size,
-//! numbered in order under one name; no camera wrote its name or its lens into them; nearly each shows at least 85 % of what the one before
-//! does, in the same light; and fewer than half of them are needed.
+//! No folder of photographs may lose one. Files are taken for frames only if all of this holds: there are thirty or
+//! more of one format and size, numbered in order under one name; no camera wrote its name or its lens into them;
+//! nearly each shows at least 85 % of what the one before does, in the same light; and fewer than half of them are
+//! needed.
 
 use std::path::Path;
 
@@ -25,12 +26,12 @@ pub const FRAMES_PASSED_OVER: &str = "frames-passed-over";
 /// Fewest files that are looked at: a second of video. Fewer are stitched soon enough as they are.
 const FEWEST: usize = 30;
 
-/// Share of a frame that the next one shows, too. Photographs that were taken one by one have half or three quarters in common; where all have so
-/// much, every second one is enough.
+/// Share of a frame that the next one shows, too. Photographs that were taken one by one have half or three quarters in
+/// common; where all have so much, every second one is enough.
 const LEAST_OVERLAP: f64 = 0.85;
 
-/// Most that the mean level changes from a frame to the next, gray levels: half a stop, by which the exposures of a bracket differ at least,
-/// changes a dark picture of level 40 by as much.
+/// Most that the mean level changes from a frame to the next, gray levels: half a stop, by which the exposures of a
+/// bracket differ at least, changes a dark picture of level 40 by as much.
 const MOST_CHANGE: f64 = 8.0;
 
 /// Share of the steps from a file to the next that are those of a video; what else there is are cuts and flashes.
@@ -45,8 +46,8 @@ const SMALL_PIXELS: f64 = 480.0 * 360.0;
 /// Most frames that are decoded at a time, if the memory is not less.
 const AT_ONCE: usize = 64;
 
-/// The numbers of the photographs without the frames that no panorama needs. Nothing is passed over where the user speaks of single photographs or
-/// wants them all.
+/// The numbers of the photographs without the frames that no panorama needs. Nothing is passed over where the user
+/// speaks of single photographs or wants them all.
 ///
 /// # Errors
 /// [`trueup_core::Error::Limits`] if one cannot be measured in the memory; [`trueup_core::Error::Cancelled`].

@@ -1,4 +1,5 @@
-//! Light that is brighter than white: whether photographs have any, and the range in which all of them are handed out then.
+//! Light that is brighter than white: whether photographs have any, and the range in which all of them are handed out
+//! then.
 
 use rayon::prelude::*;
 use trueup_core::color::{LightRange, TransferCurve};
@@ -22,19 +23,20 @@ pub(crate) enum WantedLight {
 /// The light in which floating point samples are looked at first: any that such files hold.
 const ANY_LIGHT: LightRange = LightRange { white: 1.0 / (1 << 10) as f64, peak: (1_u64 << 40) as f64 };
 
-/// The brightest sample of photographs whose light ends at white, as they are exported with floating point samples: white but for rounding,
-/// or at least a quarter of it.
+/// The brightest sample of photographs whose light ends at white, as they are exported with floating point samples:
+/// white but for rounding, or at least a quarter of it.
 const ENDS_AT_WHITE: std::ops::RangeInclusive<f64> = 0.25..=1.005;
 
-/// Light of the middle tone, as a share of what is drawn as white: with it, half of a picture is darker than sRGB's level 172, as in photographs
-/// of rooms and streets.
+/// Light of the middle tone, as a share of what is drawn as white: with it, half of a picture is darker than sRGB's
+/// level 172, as in photographs of rooms and streets.
 const MIDDLE: f64 = 0.4;
 
 /// How far above the brightest sample light is kept: as far as samples of [`ANY_LIGHT`] are rounded, and a little more.
 const ROOM: f64 = 1.05;
 
-/// The range of the floating point photographs among `images`; `None` if there is none, or their light ends at white as that of other
-/// photographs. Each is decoded; those that cannot be are passed over, and told of where they are measured.
+/// The range of the floating point photographs among `images`; `None` if there is none, or their light ends at white as
+/// that of other photographs. Each is decoded; those that cannot be are passed over, and told of where they are
+/// measured.
 ///
 /// # Errors
 /// [`trueup_core::Error::Cancelled`].
@@ -88,11 +90,12 @@ fn range_of(middle: f64, peak: f64) -> LightRange {
     LightRange { white: (middle / MIDDLE).min(peak), peak }
 }
 
-/// How far above the white of its darkest exposure the light of a stack may come out: the exposures are measured anew when it is merged, and
-/// what evens out its light is in that, too.
+/// How far above the white of its darkest exposure the light of a stack may come out: the exposures are measured anew
+/// when it is merged, and what evens out its light is in that, too.
 const ROOM_OF_STACKS: f64 = 4.0;
 
-/// The range of stacks: of each the thumbnail of the reference, whose samples are by `curve`, and by how many stops the others are brighter.
+/// The range of stacks: of each the thumbnail of the reference, whose samples are by `curve`, and by how many stops the
+/// others are brighter.
 pub(super) fn of_stacks<'a>(
     stacks: impl Iterator<Item = (&'a Raster<u8>, f64)>,
     curve: &TransferCurve,

@@ -1,5 +1,5 @@
-//! How much memory the machine has for this program, and what else limits it: containers within containers, and the limits
-//! that a shell sets (`ulimit`).
+//! How much memory the machine has for this program, and what else limits it: containers within containers, and the
+//! limits that a shell sets (`ulimit`).
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,8 +10,8 @@ const ASSUMED_MACHINE: u64 = 8_000_000_000;
 /// Without a word of the machine, this share of [`ASSUMED_MACHINE`] is taken to be free: 1 / 4.
 const ASSUMED_FREE: u64 = 4;
 
-/// Address space that a thread takes beside what it works on: a heap of the C library's own, 64 MiB (glibc's malloc/arena.c,
-/// HEAP_MAX_SIZE on 64-bit machines), and 2 MiB of stack (Rust's).
+/// Address space that a thread takes beside what it works on: a heap of the C library's own, 64 MiB (glibc's
+/// malloc/arena.c, HEAP_MAX_SIZE on 64-bit machines), and 2 MiB of stack (Rust's).
 const THREAD_SPACE: u64 = 66 << 20;
 
 /// Limits from here on are none: version 1 of control groups says "unlimited" by the largest number of whole pages.
@@ -103,8 +103,8 @@ fn number_after(text: &str, name: &str) -> Option<u64> {
 
 /// What the text of /proc/PID/limits leaves to a program's data.
 ///
-/// Threads reserve address space that they do not fill. Where that is short, the C library does without: no more than half
-/// of it is counted as taken by them.
+/// Threads reserve address space that they do not fill. Where that is short, the C library does without: no more than
+/// half of it is counted as taken by them.
 ///
 /// # Source
 /// proc_pid_limits(5); getrlimit(2): RLIMIT_AS, RLIMIT_DATA.

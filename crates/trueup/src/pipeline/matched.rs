@@ -92,7 +92,8 @@ impl Matched {
         Ok(Component::new(members, reference, rotation, &self.set.images, &self.measured, &self.pairs))
     }
 
-    /// An error of the group `members`, which names it where it is one of several `groups` and a choice that was made suits the others.
+    /// An error of the group `members`, which names it where it is one of several `groups` and a choice that was made
+    /// suits the others.
     pub(crate) fn of_group(&self, error: Error, members: &[usize], groups: &[Vec<usize>]) -> Error {
         let number = groups.iter().position(|group| group == members).filter(|_| groups.len() > 1);
         match (error, number, members) {
@@ -141,8 +142,8 @@ impl Matched {
         none_usable(undecodable.chain(self.set.rejected.iter().cloned().map(reason_of_rejected)).collect())
     }
 
-    /// Why a photograph is left out of the panorama at hand: it cannot be read, is in another one of those stitched, or in
-    /// none of them.
+    /// Why a photograph is left out of the panorama at hand: it cannot be read, is in another one of those stitched, or
+    /// in none of them.
     pub(crate) fn why_left_out(&self, index: usize, stitched: &[Vec<usize>]) -> LeftOut {
         if let Some(error) = &self.undecodable[index] {
             let (reason, hint) = match error {

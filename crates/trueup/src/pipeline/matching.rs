@@ -1,5 +1,5 @@
-//! The match phase: from features to matched pairs and their graph, as far as they are not known from earlier runs. Photographs that are left over are
-//! looked at again, by what is coarse in them.
+//! The match phase: from features to matched pairs and their graph, as far as they are not known from earlier runs.
+//! Photographs that are left over are looked at again, by what is coarse in them.
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,7 +22,8 @@ use crate::workers::Division;
 /// The code of pairs that are joined by what is coarse alone.
 pub(crate) const JOINED_BY_COARSE: &str = "joined-by-coarse-features";
 
-/// What the phase works on. Photographs are counted 0..N; `features`, `coarse`, `frames`, `told`, `usable`, `images` and `keys` have N entries.
+/// What the phase works on. Photographs are counted 0..N; `features`, `coarse`, `frames`, `told`, `usable`, `images`
+/// and `keys` have N entries.
 #[derive(Debug)]
 pub(crate) struct MatchInput<'a> {
     pub features: &'a dyn FeatureSource,
@@ -87,7 +88,8 @@ impl Look {
     }
 }
 
-/// Matches the pairs of photographs that are worth it, or those wished for; where photographs are left over, those once more by what is coarse.
+/// Matches the pairs of photographs that are worth it, or those wished for; where photographs are left over, those once
+/// more by what is coarse.
 ///
 /// # Errors
 /// Those of [`likeness`], [`Proposals::new`] and [`matching::run`].
@@ -119,8 +121,8 @@ fn is_stranger(strangers: &[Stranger], photograph: usize) -> bool {
     strangers.iter().any(|stranger| stranger.photograph == photograph)
 }
 
-/// Looks at the pairs that are apart by what is coarse, and joins those that overlap by that; a pair that does not keeps its verdict. Where nothing is
-/// left over, nothing is looked at.
+/// Looks at the pairs that are apart by what is coarse, and joins those that overlap by that; a pair that does not
+/// keeps its verdict. Where nothing is left over, nothing is looked at.
 fn look_again(input: &MatchInput, first: Matches, options: &MatchOptions, context: &StageContext) -> Result<Matches> {
     // What looks different does so however it is looked at.
     let differing = first.pairs.iter().filter(|pair| pair.verdict == PairVerdict::LooksDifferent);
@@ -160,7 +162,8 @@ fn look_again(input: &MatchInput, first: Matches, options: &MatchOptions, contex
     Ok(matches)
 }
 
-/// The pairs with those `found` in the place of their own first look; in the order of photographs, unless they are `wished` for in their own.
+/// The pairs with those `found` in the place of their own first look; in the order of photographs, unless they are
+/// `wished` for in their own.
 fn replaced(mut pairs: Vec<PairMatches>, found: Vec<PairMatches>, wished: bool) -> Vec<PairMatches> {
     for pair in found {
         match pairs.iter_mut().find(|known| (known.a, known.b) == (pair.a, pair.b)) {

@@ -26,8 +26,8 @@ use crate::workers::Division;
 
 const STAGE: &str = "measuring";
 
-/// Pixels of the small copies that exposures are compared on: enough for the brightness of an overlap, and small enough to
-/// be kept for every photograph.
+/// Pixels of the small copies that exposures are compared on: enough for the brightness of an overlap, and small enough
+/// to be kept for every photograph.
 pub(crate) const THUMBNAIL_PIXELS: f64 = 30_000.0;
 
 /// What the phase works on.
@@ -88,8 +88,8 @@ const DECODING: &str = "decoding";
 const FEATURES: &str = "features";
 const LINES: &str = "lines";
 
-/// Measures every photograph, as many in parallel as the memory bears, but for those that earlier runs measured. A photograph
-/// that cannot be decoded yields its error; the others go on.
+/// Measures every photograph, as many in parallel as the memory bears, but for those that earlier runs measured. A
+/// photograph that cannot be decoded yields its error; the others go on.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
@@ -127,8 +127,8 @@ pub(crate) fn run(
             context.progress().advance(STAGE, 1);
             measured.map(|measured| shelved(measured, shelf))
         };
-        // Threads that share a photograph's work may begin another one meanwhile: where memory counts, only groups limit
-        // them.
+        // Threads that share a photograph's work may begin another one meanwhile: where memory counts, only groups
+        // limit them.
         let mut measured: Vec<Result<Reported<Measured>>> = Vec::with_capacity(count);
         for group in groups(count, set.measuring.at_once) {
             let first = group.start;
@@ -156,8 +156,8 @@ pub(crate) fn run(
     })
 }
 
-/// What some photographs of a set are measured as, in their order, for somebody else; `None` for those that are in trouble, which is
-/// found out again, and told, by who asked.
+/// What some photographs of a set are measured as, in their order, for somebody else; `None` for those that are in
+/// trouble, which is found out again, and told, by who asked.
 ///
 /// # Errors
 /// [`Error::Cancelled`]; [`Error::Options`].

@@ -34,7 +34,8 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    /// Forgets what is in the parts that `ignored` marks in the photograph's pixels. Features are in memory then, wherever they were.
+    /// Forgets what is in the parts that `ignored` marks in the photograph's pixels. Features are in memory then,
+    /// wherever they were.
     ///
     /// # Errors
     /// [`trueup_core::Error::Io`] if features cannot be read.

@@ -1,6 +1,7 @@
 //! The order of the work, whole, and nowhere else:
 //!
-//! photographs -> [measure] -> [borders] -> [stacking] -> [carrier] -> [matching] -> [align] -> [arrange] -> [compose] -> panorama
+//! photographs -> [measure] -> [borders] -> [stacking] -> [carrier] -> [matching] -> [align] -> [arrange] -> [compose]
+//! -> panorama
 //!
 //! A phase is a function of its input, its options and a context; what it told on the way comes beside its product.
 
@@ -105,31 +106,30 @@ pub struct Stitcher<'a> {
 }
 
 impl<'a> Stitcher<'a> {
-    /// A stitcher with these options, whose progress goes where that of `context` goes and which stops with it. Parallel work
-    /// runs on the current thread pool.
+    /// A stitcher with these options, whose progress goes where that of `context` goes and which stops with it.
+    /// Parallel work runs on the current thread pool.
     pub fn new(options: &'a StitchOptions, context: &StageContext<'a>) -> Self {
         let context = context.seeded(options.matching.random.seed);
         Self { options, context, cache: None, output: None, workers: None }
     }
 
-    /// The same stitcher, which finds results of earlier runs in `cache` and keeps its own there. They decide how long the
-    /// work takes, never what comes of it.
+    /// The same stitcher, which finds results of earlier runs in `cache` and keeps its own there. They decide how long
+    /// the work takes, never what comes of it.
     #[must_use]
     pub fn with_cache(self, cache: Option<&'a PhotographCache>) -> Self {
         Self { cache, ..self }
     }
 
-    /// The same stitcher, which has `workers` measure and match photographs, make them small and finish the canvas, as far as the
-    /// photographs are files without masks; and of blends those along seams. The panorama is the same.
+    /// The same stitcher, which has `workers` measure and match photographs, make them small and finish the canvas, as
+    /// far as the photographs are files without masks; and of blends those along seams. The panorama is the same.
     #[must_use]
     pub fn with_workers(self, workers: Option<&'a dyn Workers>) -> Self {
         Self { workers: workers.map(|workers| Division::new(workers, self.options)), ..self }
     }
 
-    /// The same stitcher for panoramas that will be written to `output`: where that keeps light, stacks are merged to light, unless
-    /// `stacks.fuse` says otherwise; scratch files go into the same folder, unless
-    /// `resources.scratch` names one, and leave room for them. Without, scratch files go where the system wants temporary
-    /// files.
+    /// The same stitcher for panoramas that will be written to `output`: where that keeps light, stacks are merged to
+    /// light, unless `stacks.fuse` says otherwise; scratch files go into the same folder, unless `resources.scratch`
+    /// names one, and leave room for them. Without, scratch files go where the system wants temporary files.
     #[must_use]
     pub fn writing_to<'b>(&self, output: &'b Path) -> Stitcher<'b>
     where
@@ -153,12 +153,12 @@ impl<'a> Stitcher<'a> {
         self.align_matched(&self.match_photographs(inputs)?, inputs)
     }
 
-    /// Finds, measures and matches the photographs. What comes of it can be aligned several times, with other references
-    /// or other options of the later phases.
+    /// Finds, measures and matches the photographs. What comes of it can be aligned several times, with other
+    /// references or other options of the later phases.
     ///
     /// # Errors
-    /// [`Error::Options`]; [`Error::Input`] when no photograph can be read, or the graph or the reference does not fit the
-    /// photographs; [`Error::Limits`]; [`Error::Cancelled`].
+    /// [`Error::Options`]; [`Error::Input`] when no photograph can be read, or the graph or the reference does not fit
+    /// the photographs; [`Error::Limits`]; [`Error::Cancelled`].
     pub fn match_photographs(&self, inputs: &Inputs) -> Result<MatchedPhotographs> {
         self.options.validate()?;
         let found = self.context.gather(|context| {
@@ -219,19 +219,19 @@ impl<'a> Stitcher<'a> {
 
     /// Estimates the geometry of the panoramas that matched photographs make.
     ///
-    /// Of `inputs`, the photographs and the graph are those that were matched; the reference, `all` and `require_all` are
-    /// heeded.
+    /// Of `inputs`, the photographs and the graph are those that were matched; the reference, `all` and `require_all`
+    /// are heeded.
     ///
     /// # Errors
-    /// [`Error::Options`]; [`Error::Input`] when the reference does not fit the photographs, or `require_all` is not met;
-    /// [`Error::Unsolvable`] when no two photographs overlap; [`Error::Cancelled`].
+    /// [`Error::Options`]; [`Error::Input`] when the reference does not fit the photographs, or `require_all` is not
+    /// met; [`Error::Unsolvable`] when no two photographs overlap; [`Error::Cancelled`].
     pub fn align_matched(&self, set: &MatchedPhotographs, inputs: &Inputs) -> Result<Aligned> {
         self.align_groups(set, inputs, None)
     }
 
-    /// [`Self::align_matched`] with vanishing directions that are known already, in place of those that the photographs'
-    /// lines tell: `directions` holds one entry for each photograph of the largest group, as [`Alignment::directions`] has
-    /// them.
+    /// [`Self::align_matched`] with vanishing directions that are known already, in place of those that the
+    /// photographs' lines tell: `directions` holds one entry for each photograph of the largest group, as
+    /// [`Alignment::directions`] has them.
     ///
     /// # Errors
     /// Those of [`Self::align_matched`]; [`Error::Input`] if there are more or fewer directions than photographs.
@@ -349,13 +349,13 @@ impl<'a> Stitcher<'a> {
         Ok(Alignment { project, layout, kept: None, corrections, photographs, directions, positions: None, evidence })
     }
 
-    /// The geometry that `project` records, over the photographs that were `found`: those used in it, in its order, or others
-    /// of their sizes. The canvas is laid out anew if the options ask for another one, and the light evened out anew if they ask
-    /// for that. Another view is measured by the `evidence`, or not at all.
+    /// The geometry that `project` records, over the photographs that were `found`: those used in it, in its order, or
+    /// others of their sizes. The canvas is laid out anew if the options ask for another one, and the light evened out
+    /// anew if they ask for that. Another view is measured by the `evidence`, or not at all.
     ///
     /// # Errors
-    /// [`Error::Options`]; [`Error::Input`] if the project was damaged; [`Error::NotApplicable`] if a projection is asked
-    /// for and the project has no cameras; those of the layout; [`Error::Limits`]; [`Error::Cancelled`].
+    /// [`Error::Options`]; [`Error::Input`] if the project was damaged; [`Error::NotApplicable`] if a projection is
+    /// asked for and the project has no cameras; those of the layout; [`Error::Limits`]; [`Error::Cancelled`].
     pub(crate) fn recall(
         &self,
         project: &Project,
@@ -418,13 +418,13 @@ impl<'a> Stitcher<'a> {
         Ok(context.absorb(compose::light(&light, &self.options.compose, context)?))
     }
 
-    /// Renders an aligned panorama from the full-resolution photographs, within `resources.memory`, and crops it. What was found
-    /// on the way and how long it took goes into the alignment's record, and so does what of the canvas was kept: an alignment
-    /// that is composed again keeps the same.
+    /// Renders an aligned panorama from the full-resolution photographs, within `resources.memory`, and crops it. What
+    /// was found on the way and how long it took goes into the alignment's record, and so does what of the canvas was
+    /// kept: an alignment that is composed again keeps the same.
     ///
     /// # Errors
-    /// Those of reading the photographs and of a scratch file; [`Error::Limits`] with the numbers, before any photograph is
-    /// read, if the canvas is too large for the memory or the disk; [`Error::Cancelled`].
+    /// Those of reading the photographs and of a scratch file; [`Error::Limits`] with the numbers, before any
+    /// photograph is read, if the canvas is too large for the memory or the disk; [`Error::Cancelled`].
     pub fn compose(&self, alignment: &mut Alignment) -> Result<Rendered> {
         let scratch = scratch::folder(&alignment.layout, self.options, self.output)?;
         let divided = self
@@ -497,8 +497,8 @@ impl<'a> Stitcher<'a> {
     }
 }
 
-/// Measures another view of the panorama that `project` records by the `evidence`, and says anew what of it is to be looked at;
-/// without evidence nothing is known of it.
+/// Measures another view of the panorama that `project` records by the `evidence`, and says anew what of it is to be
+/// looked at; without evidence nothing is known of it.
 fn measure_anew(project: &mut Project, evidence: Option<&Evidence>, arrangement: &Arrangement, context: &StageContext) {
     project.diagnostics.retain(|told| !judgement::is_of_measures(told));
     let measure = |evidence| context.time("measures", || measuring::run(evidence, arrangement, &project.images));

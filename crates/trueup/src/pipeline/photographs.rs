@@ -64,8 +64,8 @@ impl PhotographSet {
     /// Finds what `inputs` name.
     ///
     /// # Errors
-    /// [`Error::Input`] if there is no photograph, or the reference, a mask or the project of a lens fits none; [`Error::Limits`];
-    /// [`Error::Cancelled`].
+    /// [`Error::Input`] if there is no photograph, or the reference, a mask or the project of a lens fits none;
+    /// [`Error::Limits`]; [`Error::Cancelled`].
     pub(crate) fn find(inputs: &Inputs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
         let accepted = &options.measure.source;
         let scan =
@@ -119,7 +119,8 @@ impl PhotographSet {
         Ok(Self { images, rejected, masks: records, lens_from, files: Arc::new(files), measuring })
     }
 
-    /// What a set was opened from, in the light that it turned out to have: to be changed, and [opened again](Self::reopened).
+    /// What a set was opened from, in the light that it turned out to have: to be changed, and [opened
+    /// again](Self::reopened).
     pub(crate) fn into_found(self) -> FoundPhotographs {
         let Self { images, rejected, masks: records, lens_from, files, .. } = self;
         FoundPhotographs {
@@ -151,8 +152,9 @@ impl PhotographSet {
         self.masks.iter().map(|masks| !masks.is_empty()).collect()
     }
 
-    /// What decides the pixels of these photographs: their bytes, how they are turned and masked, the color space and the light that they are brought
-    /// to, and of a stack the same of each exposure. `None` for files that cannot be read.
+    /// What decides the pixels of these photographs: their bytes, how they are turned and masked, the color space and
+    /// the light that they are brought to, and of a stack the same of each exposure. `None` for files that cannot be
+    /// read.
     ///
     /// # Errors
     /// [`Error::Cancelled`].
@@ -189,8 +191,8 @@ impl PhotographSet {
     }
 }
 
-/// The photographs `files` of `images`, whose [light is told](light::handed_out_in), in one color space and in that light: as panoramas are stitched
-/// from them, and measured again.
+/// The photographs `files` of `images`, whose [light is told](light::handed_out_in), in one color space and in that
+/// light: as panoramas are stitched from them, and measured again.
 pub(crate) fn handed_out(
     files: FilePhotographs,
     images: &[SourceImage],

@@ -14,15 +14,16 @@ use crate::project::record::ImageRecord;
 use crate::project::replace::named_photographs;
 
 impl Stitcher<'_> {
-    /// The geometry of `alignment`, arranged by this stitcher's options, over the photographs that `shown` names in place of
-    /// its own, one for each in [`Project::used_images`](crate::Project::used_images): rigs and videos are aligned once. Of
-    /// `shown`, the photographs are heeded; masks are those of the photographs that were aligned.
+    /// The geometry of `alignment`, arranged by this stitcher's options, over the photographs that `shown` names in
+    /// place of its own, one for each in [`Project::used_images`](crate::Project::used_images): rigs and videos are
+    /// aligned once. Of `shown`, the photographs are heeded; masks are those of the photographs that were aligned.
     ///
     /// # Errors
-    /// [`Error::Options`](trueup_core::Error::Options); [`Error::Unsupported`](trueup_core::Error::Unsupported) if an option of
-    /// the geometry is another one than when it was found; [`Error::Input`](trueup_core::Error::Input) if there are more or
-    /// fewer photographs, or they have other sizes; [`Error::NotApplicable`](trueup_core::Error::NotApplicable) if a projection
-    /// is asked for and no camera is known; those of the layout; [`Error::Limits`](trueup_core::Error::Limits);
+    /// [`Error::Options`](trueup_core::Error::Options); [`Error::Unsupported`](trueup_core::Error::Unsupported) if an
+    /// option of the geometry is another one than when it was found; [`Error::Input`](trueup_core::Error::Input) if
+    /// there are more or fewer photographs, or they have other sizes;
+    /// [`Error::NotApplicable`](trueup_core::Error::NotApplicable) if a projection is asked for and no camera is known;
+    /// those of the layout; [`Error::Limits`](trueup_core::Error::Limits);
     /// [`Error::Cancelled`](trueup_core::Error::Cancelled).
     pub fn rearrange(&self, alignment: &Alignment, shown: Option<&Inputs>) -> Result<Alignment> {
         let project = &alignment.project;

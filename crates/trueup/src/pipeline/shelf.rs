@@ -1,5 +1,6 @@
-//! Where photographs' features are from when they are measured until they are matched: in memory as far as there is room, else in a
-//! scratch file. They are most of what is known of a photograph, and only two of them are looked at at a time.
+//! Where photographs' features are from when they are measured until they are matched: in memory as far as there is
+//! room, else in a scratch file. They are most of what is known of a photograph, and only two of them are looked at at
+//! a time.
 
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -28,7 +29,8 @@ struct Taken {
     file: Option<Arc<dyn ScratchFile>>,
     /// Where it ends.
     end: u64,
-    /// Whether the disk refused: features stay in memory then, however little there is, since without them nothing goes on.
+    /// Whether the disk refused: features stay in memory then, however little there is, since without them nothing goes
+    /// on.
     is_refused: bool,
 }
 

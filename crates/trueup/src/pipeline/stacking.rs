@@ -70,8 +70,8 @@ impl AlignedStack {
     }
 }
 
-/// Finds stacks among the photographs, aligns their members, and measures what they are fused to; without any, everything stays as it
-/// was.
+/// Finds stacks among the photographs, aligns their members, and measures what they are fused to; without any,
+/// everything stays as it was.
 ///
 /// # Errors
 /// [`trueup_core::Error::Limits`]; [`trueup_core::Error::Cancelled`].
@@ -207,8 +207,8 @@ fn aligned_stacks(
     Ok(aligned)
 }
 
-/// The stacks among the candidates, whose measurements are decided by `keys`, unless an earlier run found them among the same ones in the
-/// same order.
+/// The stacks among the candidates, whose measurements are decided by `keys`, unless an earlier run found them among
+/// the same ones in the same order.
 fn known_stacks(candidates: &[StackCandidate], keys: &[Option<Key>], memo: Memo) -> Result<Vec<FoundStack>> {
     let of_one = |maker: KeyMaker, (candidate, key): (&StackCandidate, &Option<Key>)| {
         let StackCandidate { thumbnail, camera, recorded_stops } = candidate;
@@ -225,7 +225,8 @@ fn known_stacks(candidates: &[StackCandidate], keys: &[Option<Key>], memo: Memo)
     memo.found_or_made(STACKS, key.as_ref(), is_whole, || Ok(stacks::find(candidates)))
 }
 
-/// `None` where no member lies on the reference, or a file can no longer be read: each photograph then stands for itself.
+/// `None` where no member lies on the reference, or a file can no longer be read: each photograph then stands for
+/// itself.
 fn aligned_stack(
     found: &FoundStack,
     set: &PhotographSet,
@@ -316,7 +317,8 @@ fn stacked_set(
 }
 
 fn left_out(image: &SourceImage, reference: &str, reason: LeftOut) -> RejectedSource {
-    // Where the reason is the same for every stack, it does not name the stack: exposures of one reason are told together.
+    // Where the reason is the same for every stack, it does not name the stack: exposures of one reason are told
+    // together.
     let of_any = |why: &str| format!("it is an exposure of a stack, but {why}");
     let of_this = |why: String| format!("it is an exposure of the stack of {reference}, but {why}");
     let (code, reason) = match reason {
@@ -505,7 +507,8 @@ mod tests {
 
     #[test]
     fn a_map_of_reduced_pictures_is_one_of_the_whole_ones() {
-        // x' = (x + 3) / (1 + 0.01 x) of pictures at half the size: at 20 whole pixels, 13 / 1.1 of these, 26 / 1.1 whole ones.
+        // x' = (x + 3) / (1 + 0.01 x) of pictures at half the size: at 20 whole pixels, 13 / 1.1 of these, 26 / 1.1
+        // whole ones.
         let small = Homography::from_rows(&[[1.0, 0.0, 3.0], [0.0, 1.0, 0.0], [0.01, 0.0, 1.0]]);
         let place = in_full_pixels(&small, 0.5).apply([20.0, 0.0].into());
         assert!((place.x - 26.0 / 1.1).abs() < 1e-12);

@@ -8,8 +8,8 @@ use trueup_core::{Error, Result};
 
 use super::record::{ImageRecord, Project};
 
-/// Recorded factors on light: twenty stops to both sides, several more than a camera's darkest and brightest exposures of one scene
-/// lie apart.
+/// Recorded factors on light: twenty stops to both sides, several more than a camera's darkest and brightest exposures
+/// of one scene lie apart.
 const GAINS: RangeInclusive<f64> = 1e-6..=1e6;
 
 impl Project {

@@ -13,9 +13,10 @@ use trueup_core::lens::PlacedLens;
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::{SourceImage, StackMember};
 
+use super::level::{LevelRecord, ManhattanRecord};
 use super::record::{
-    Canvas, CropRecord, FlatSceneRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord,
-    PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, StackMemberRecord,
+    Canvas, CropRecord, FlatSceneRecord, ImageRecord, ImageStatus, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION,
+    PairRecord, Project, StackMemberRecord,
 };
 use crate::options::{MethodForm, StitchOptions};
 use crate::pipeline::align::Geometry;
@@ -25,8 +26,8 @@ use crate::pipeline::compose::CROP_TOO_SMALL;
 use crate::pipeline::matched::Matched;
 use crate::pipeline::photographs::PhotographSet;
 
-/// The record of all photographs and pairs, without geometry, for the panorama of `members`; `stitched` are the members of
-/// all panoramas.
+/// The record of all photographs and pairs, without geometry, for the panorama of `members`; `stitched` are the members
+/// of all panoramas.
 pub(crate) fn unfilled(
     matched: &Matched,
     options: &StitchOptions,
@@ -200,8 +201,8 @@ fn rename<'a>(names: impl Iterator<Item = &'a mut String>, renamed: &BTreeMap<St
 }
 
 impl Project {
-    /// Names photographs and masks by other paths, where they are to be found from now on: those that `moved` has by the paths that
-    /// are recorded.
+    /// Names photographs and masks by other paths, where they are to be found from now on: those that `moved` has by
+    /// the paths that are recorded.
     pub fn rename_files(&mut self, moved: &BTreeMap<String, String>) {
         for image in &mut self.images {
             let masks = image.masks.iter_mut().map(|mask| &mut mask.path);

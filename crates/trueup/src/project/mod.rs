@@ -3,6 +3,7 @@
 mod check;
 pub(crate) mod fill;
 pub(crate) mod hugin;
+pub(crate) mod level;
 pub(crate) mod paths;
 pub(crate) mod projection;
 pub(crate) mod provenance;
@@ -13,18 +14,20 @@ pub(crate) mod replace;
 use std::path::Path;
 
 pub use hugin::{HuginImage, HuginProject, hugin_project};
+pub use level::{LevelRecord, LineGuide, ManhattanRecord};
 pub use projection::ProjectionRecord;
 pub use record::{
-    Canvas, CropRecord, FlatSceneRecord, ImageRecord, ImageStatus, LevelRecord, LineGuide, ManhattanRecord, MaskKind,
-    MaskRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, StackMemberRecord,
+    Canvas, CropRecord, FlatSceneRecord, ImageRecord, ImageStatus, MaskKind, MaskRecord, MeshRecord, PROJECT_FORMAT,
+    PROJECT_VERSION, PairRecord, Project, StackMemberRecord,
 };
 use trueup_core::{Error, Result, StageContext};
 
-/// The panorama that a file describes: a project as a stitch wrote it, or one of Hugin's (`.pto`), whose photographs are looked for
-/// as [`HuginProject::project`] says.
+/// The panorama that a file describes: a project as a stitch wrote it, or one of Hugin's (`.pto`), whose photographs
+/// are looked for as [`HuginProject::project`] says.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is neither, or damaged; those of [`HuginProject::project`].
+/// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is neither, or damaged; those of
+/// [`HuginProject::project`].
 pub fn read_project(path: &Path, context: &StageContext) -> Result<Project> {
     let file = path.display().to_string();
     if path.is_dir() {

@@ -8,8 +8,8 @@ use trueup_compose::crop::Rectangle;
 use trueup_compose::layout::CanvasLayout;
 use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 
-/// Share of the half turn from pole to pole that a whole sphere shows at least: what lies at a pole is often not photographed, where the
-/// tripod stands.
+/// Share of the half turn from pole to pole that a whole sphere shows at least: what lies at a pole is often not
+/// photographed, where the tripod stands.
 pub(crate) const WHOLE_SPHERE: f64 = 0.75;
 
 /// What lies farther away than this, in panorama pixels, has no place any more: no file format is as wide.
@@ -18,9 +18,9 @@ pub(crate) const FARTHEST_PX: f64 = 4_294_967_296.0;
 /// Least scale that is recorded, canvas pixels per radian: a whole turn on less than a pixel is no panorama.
 const LEAST_PX_PER_RADIAN: f64 = 1e-3;
 
-/// How the panorama is drawn from directions. A direction of the level world (x right, y down, z forward) that the rotations
-/// `yaw`, `pitch` and `roll` turn into the viewer's lies at `(plane - origin) * px_per_radian` on the canvas, where `plane` is
-/// its place in the projection.
+/// How the panorama is drawn from directions. A direction of the level world (x right, y down, z forward) that the
+/// rotations `yaw`, `pitch` and `roll` turn into the viewer's lies at `(plane - origin) * px_per_radian` on the canvas,
+/// where `plane` is its place in the projection.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ProjectionRecord {
     /// The projection's name.
@@ -135,8 +135,8 @@ mod tests {
         CanvasLayout { width, height, canvas_from_target: 1000.0, origin, placed: Vec::new(), period: None }
     }
 
-    /// 1000 pixels a radian: the whole is 6283 x 3142 pixels, its middle at (3141.6, 1570.8); the canvas begins half a radian
-    /// left of it and 0.2 radians above the horizon.
+    /// 1000 pixels a radian: the whole is 6283 x 3142 pixels, its middle at (3141.6, 1570.8); the canvas begins half a
+    /// radian left of it and 0.2 radians above the horizon.
     #[test]
     fn a_cropped_panorama_knows_its_place_on_the_sphere() {
         let frame = sphere(&view(FlatKind::Equirectangular), &canvas(1200, 700, [-0.5, -0.2])).expect("a sphere");

@@ -102,7 +102,8 @@ fn is_stray(mesh: &GridMesh, canvas: Canvas) -> bool {
         || high.y > height + ROUNDED_PX
 }
 
-/// All that grids cover of which `part` is recorded, and the grids moved there; of a full turn, rows alone were cut off.
+/// All that grids cover of which `part` is recorded, and the grids moved there; of a full turn, rows alone were cut
+/// off.
 fn whole_canvas(meshes: &mut [GridMesh], part: Canvas) -> Canvas {
     if !meshes.iter().any(|mesh| is_stray(mesh, part)) {
         return part;
@@ -160,8 +161,8 @@ impl ImageRecord {
         }
     }
 
-    /// The grid of a photograph in use over the original photograph, in the panorama. Vertices for which a projection has no
-    /// place are NaN.
+    /// The grid of a photograph in use over the original photograph, in the panorama. Vertices for which a projection
+    /// has no place are NaN.
     ///
     /// # Errors
     /// [`Error::Input`] if it is missing or damaged.
@@ -226,8 +227,8 @@ pub(crate) fn knows_light(project: &Project) -> bool {
     project.used_images().any(|record| record.correction.is_some() || record.gain.is_some())
 }
 
-/// What evens out the light of used photographs, the `records` of `project`; gains alone in files of programs that knew no
-/// more.
+/// What evens out the light of used photographs, the `records` of `project`; gains alone in files of programs that knew
+/// no more.
 ///
 /// # Errors
 /// [`Error::Input`] if one is no positive factor on light.
@@ -298,8 +299,8 @@ pub(crate) fn find_file(
     Ok(image)
 }
 
-/// Farthest that a recorded homography may take a corner from its place, in longer sides: what is aligned stays within a tenth, so that a
-/// record of any program passes, and one that no camera can have turned by does not.
+/// Farthest that a recorded homography may take a corner from its place, in longer sides: what is aligned stays within
+/// a tenth, so that a record of any program passes, and one that no camera can have turned by does not.
 const FARTHEST_TURN: f64 = 0.5;
 
 /// Refuses homographies that are none of two exposures of one view.
@@ -397,8 +398,8 @@ mod tests {
         assert!(recorded.corrections.response.is_plain());
     }
 
-    /// Version 1 recorded the solved grids, whatever the panorama was drawn on: such a file can be composed, but holds no
-    /// grids of the panorama.
+    /// Version 1 recorded the solved grids, whatever the panorama was drawn on: such a file can be composed, but holds
+    /// no grids of the panorama.
     #[test]
     fn a_projection_of_version_1_has_solved_grids_alone() {
         let mut older = project();

@@ -6,7 +6,6 @@ use std::path::Path;
 use serde::{Deserialize, Deserializer, Serialize};
 use trueup_align::cameras::FlatEvidence;
 use trueup_align::mesh::CameraPlane;
-use trueup_align::similarity::LevelSource;
 use trueup_compose::exposure::{Correction, Response};
 use trueup_core::camera::Camera;
 use trueup_core::carrier::CarrierParts;
@@ -19,6 +18,7 @@ use trueup_core::matches::PairVerdict;
 use trueup_core::outline::Outline;
 use trueup_io::source::unique_names;
 
+use super::level::ManhattanRecord;
 use super::paths::file_name;
 use super::projection::ProjectionRecord;
 use crate::options::StitchOptions;
@@ -28,8 +28,8 @@ use crate::report::measures::Measures;
 pub const PROJECT_FORMAT: &str = "trueup-project";
 /// The `version` field: raised when a field changes its meaning.
 ///
-/// 2: the grids are those of the panorama, with a projection too. Files of version 1 are read; those with a projection can
-/// be composed, but hold no grids of the panorama.
+/// 2: the grids are those of the panorama, with a projection too. Files of version 1 are read; those with a projection
+/// can be composed, but hold no grids of the panorama.
 pub const PROJECT_VERSION: u32 = 2;
 
 /// Whether a photograph is in the panorama.
@@ -51,8 +51,8 @@ pub struct MeshRecord {
     pub cols: usize,
     /// Vertices in pixels of the original photograph after orientation; the corner is (0, 0).
     pub source: Vec<[f64; 2]>,
-    /// Vertices in pixels of the written panorama; the corner is (0, 0), and where the panorama was cropped, or a projection
-    /// shows a part, they may lie outside. NaN (null in the file) where a projection has no place for them.
+    /// Vertices in pixels of the written panorama; the corner is (0, 0), and where the panorama was cropped, or a
+    /// projection shows a part, they may lie outside. NaN (null in the file) where a projection has no place for them.
     #[serde(deserialize_with = "places_or_nowhere")]
     pub target: Vec<[f64; 2]>,
 }
@@ -67,8 +67,8 @@ fn places_or_nowhere<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MaskKind {
-    /// White parts are used; black or transparent ones are ignored: not looked at, and not shown where another photograph
-    /// can be.
+    /// White parts are used; black or transparent ones are ignored: not looked at, and not shown where another
+    /// photograph can be.
     Use,
     /// White parts are shown, whatever other photographs show there; black or transparent ones are left to the seams.
     Keep,
@@ -90,12 +90,14 @@ impl MaskRecord {
     }
 }
 
-/// Another exposure of the view of a photograph, fused with it, or with [`Project::light`] merged. It is of the same size.
+/// Another exposure of the view of a photograph, fused with it, or with [`Project::light`] merged. It is of the same
+/// size.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StackMemberRecord {
     /// The file as it was given.
     pub path: String,
-    /// Rows of the homography from its pixels to those of the reference, both of the original photographs after orientation.
+    /// Rows of the homography from its pixels to those of the reference, both of the original photographs after
+    /// orientation.
     pub reference_from_member: [[f64; 3]; 3],
 }
 
@@ -108,16 +110,16 @@ pub struct ImageRecord {
     pub width: usize,
     /// Height after orientation, without [`Self::inset`]; 0 if the file could not be read.
     pub height: usize,
-    /// What of the picture in the file, as it is shown, lies beside the photograph: an even frame, or bars. All places in the record are the
-    /// photograph's own.
+    /// What of the picture in the file, as it is shown, lies beside the photograph: an even frame, or bars. All places
+    /// in the record are the photograph's own.
     #[serde(default, skip_serializing_if = "Inset::is_none")]
     pub inset: Inset,
-    /// Corners of the polygon inside of which the photograph lies in its picture, in its pixels; what is beside it is not shown. `None` where the
-    /// whole picture is the photograph.
+    /// Corners of the polygon inside of which the photograph lies in its picture, in its pixels; what is beside it is
+    /// not shown. `None` where the whole picture is the photograph.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outline: Option<Outline>,
-    /// Where it shows what carries the camera: rectangles `[left, top, right, bottom]` in its pixels, that are not looked at, nor shown where another
-    /// photograph can be. `None` where it shows nothing of it.
+    /// Where it shows what carries the camera: rectangles `[left, top, right, bottom]` in its pixels, that are not
+    /// looked at, nor shown where another photograph can be. `None` where it shows nothing of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carrier: Option<CarrierParts>,
     /// EXIF orientation (1 to 8) that was applied to the stored pixels; 0 in files of programs that did not record it.
@@ -144,12 +146,12 @@ pub struct ImageRecord {
     pub lens: Option<PlacedLens>,
     /// Rows of the rotation from the levelled world (y down) to the camera.
     pub rotation: Option<[[f64; 3]; 3]>,
-    /// The same as the photograph's own lines correct it, which projections are drawn by; `None` in files of programs that
-    /// knew no projections.
+    /// The same as the photograph's own lines correct it, which projections are drawn by; `None` in files of programs
+    /// that knew no projections.
     #[serde(default)]
     pub upright_rotation: Option<[[f64; 3]; 3]>,
-    /// Where the camera stands before a flat scene: x to the right and y down on its plane, z away from the photographer and so
-    /// negative, in pixels of the photographs at their median scale. `None` for rotating cameras.
+    /// Where the camera stands before a flat scene: x to the right and y down on its plane, z away from the
+    /// photographer and so negative, in pixels of the photographs at their median scale. `None` for rotating cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub place: Option<[f64; 3]>,
     /// Clockwise rotation that the similarity prior wants, in degrees.
@@ -171,8 +173,8 @@ pub struct ImageRecord {
     pub vanishing_points: Option<[[f64; 3]; 3]>,
     /// The deformed grid, in the panorama.
     pub mesh: Option<MeshRecord>,
-    /// The same as the method solved it, on [`Project::mesh_canvas`]: with [`Project::projection`], which takes from its
-    /// overlaps how photographs meet, or where the panorama was cropped.
+    /// The same as the method solved it, on [`Project::mesh_canvas`]: with [`Project::projection`], which takes from
+    /// its overlaps how photographs meet, or where the panorama was cropped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solved_mesh: Option<MeshRecord>,
 }
@@ -194,124 +196,14 @@ pub struct PairRecord {
     pub verdict: PairVerdict,
 }
 
-/// How far the scene looked like a Manhattan world, and whether that guided the panorama.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ManhattanRecord {
-    /// Vanishing point divergence (0 for perfect agreement); `None` if there were no vanishing points.
-    pub divergence: Option<f64>,
-    /// Largest divergence that is accepted.
-    pub threshold: f64,
-    /// How far the best directions stand out when the lines of all photographs are searched together, in standard
-    /// deviations over all directions tried; `None` with too few lines.
-    #[serde(default)]
-    pub significance: Option<f64>,
-    /// Standard deviation of the vertical by asking different photographs, degrees; `None` where lines were not asked.
-    #[serde(default)]
-    pub vertical_deviation_deg: Option<f64>,
-    /// Whether vanishing points guided the panorama.
-    pub accepted: bool,
-    /// Whether the lines of all photographs together guided it, since the photographs' own vanishing points did not agree, or were outvoted.
-    #[serde(default)]
-    pub pooled: bool,
-    /// By how much the scene's level lines lie along a slope, degrees: these do not count. `None` where they agree with the upright ones.
-    #[serde(default)]
-    pub slope_deg: Option<f64>,
-    /// Why the photographs' own directions did not guide, in words; where all lines together were asked in their place and left the vertical open, why these did not.
-    pub failed_clause: Option<String>,
-    /// Dominant directions as columns, in the levelled world.
-    pub dominant: Option<[[f64; 3]; 3]>,
-    /// Paths of the photographs whose vanishing points agree with the dominant directions.
-    pub inliers: Vec<String>,
-    /// What told of the vertical, and of how much; empty for methods that ask nothing but the overlaps.
-    #[serde(default)]
-    pub level: Vec<LevelRecord>,
-}
-
-/// Which lines guided a panorama.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LineGuide {
-    /// The vanishing points that photographs agree on.
-    VanishingPoints,
-    /// Those of all photographs together.
-    AllLines,
-    /// Upright ones alone: photographs' own directions were refused.
-    UprightLines,
-}
-
-/// What one source said of the vertical, and what it came to count for.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct LevelRecord {
-    /// Who says it: "lines", "gravity" that cameras recorded, the far "horizon", or "cameras", that are expected to be held level.
-    pub source: LevelSource,
-    /// How many photographs it rests on.
-    pub photographs: usize,
-    /// Angle between its own vertical and the panorama's, degrees.
-    pub angle_deg: f64,
-    /// Standard deviation of its vertical about the axis that it tells least of, degrees.
-    pub deviation_deg: f64,
-    /// Its share of what the vertical rests on, 0 to 1.
-    pub share: f64,
-}
-
-impl LevelRecord {
-    /// Smallest share that is worth a word.
-    const WORTH_NAMING: f64 = 0.005;
-    /// Deviation from which an angle is as good as not known, degrees.
-    const UNKNOWN_DEG: f64 = 45.0;
-
-    fn in_words(&self) -> String {
-        let who = match self.source {
-            LevelSource::Lines => format!("lines in {}", count_of_photographs(self.photographs)),
-            LevelSource::Gravity => format!("gravity that {} recorded", count_of_photographs(self.photographs)),
-            LevelSource::Horizon => format!("the far horizon in {}", count_of_photographs(self.photographs)),
-            LevelSource::Cameras => "cameras held level".to_owned(),
-        };
-        // Up to the next tenth: what is sure to less is not told so surely.
-        let deviation_deg = (10.0 * self.deviation_deg).ceil() / 10.0;
-        let how_sure = match self.deviation_deg < Self::UNKNOWN_DEG {
-            true => format!("to {deviation_deg:.1} degrees"),
-            false => "one of its two angles".to_owned(),
-        };
-        format!("{who} {:.0} % ({how_sure})", 100.0 * self.share)
-    }
-}
-
-fn count_of_photographs(count: usize) -> String {
-    if count == 1 { "one photograph".to_owned() } else { format!("{count} photographs") }
-}
-
-impl ManhattanRecord {
-    /// Which lines guided the panorama; `None` if none did.
-    pub fn guide(&self) -> Option<LineGuide> {
-        let guide = match &self.failed_clause {
-            _ if self.pooled => LineGuide::AllLines,
-            Some(_) => LineGuide::UprightLines,
-            None => LineGuide::VanishingPoints,
-        };
-        self.accepted.then_some(guide)
-    }
-
-    /// Why the photographs' own vanishing points did not guide it, as ": " and the clause; empty where that is not known.
-    pub fn refusal_in_words(&self) -> String {
-        self.failed_clause.as_ref().map_or(String::new(), |clause| format!(": {clause}"))
-    }
-
-    /// What told of the vertical, and of how much, in words; `None` where nothing was asked.
-    pub fn level_in_words(&self) -> Option<String> {
-        let worth_naming = self.level.iter().filter(|one| one.share >= LevelRecord::WORTH_NAMING);
-        let told: Vec<String> = worth_naming.map(LevelRecord::in_words).collect();
-        (!told.is_empty()).then(|| told.join(", "))
-    }
-}
-
 /// What told that the photographs show a flat scene from places of their own, and how it is laid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FlatSceneRecord {
     /// How well a plane and how well rotating cameras explain the matches.
     #[serde(flatten)]
     pub evidence: FlatEvidence,
-    /// Clockwise turn that lines on the plane asked for, beyond what the photographs' own up and down say, degrees; `None` where they did
-    /// not agree.
+    /// Clockwise turn that lines on the plane asked for, beyond what the photographs' own up and down say, degrees;
+    /// `None` where they did not agree.
     pub turned_by_lines_deg: Option<f64>,
 }
 
@@ -322,8 +214,8 @@ pub struct Canvas {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// Whether it goes all the way round and its ends meet: columns are then meant modulo the width, and vertices may lie
-    /// beyond either end.
+    /// Whether it goes all the way round and its ends meet: columns are then meant modulo the width, and vertices may
+    /// lie beyond either end.
     #[serde(default)]
     pub full_turn: bool,
 }
@@ -368,14 +260,15 @@ pub struct Project {
     pub lens_from: Option<String>,
     /// Path of the reference photograph.
     pub reference: String,
-    /// Every photograph given, in the order given: used, left out, and unreadable. The exposures of a stack are one, by its reference.
+    /// Every photograph given, in the order given: used, left out, and unreadable. The exposures of a stack are one, by
+    /// its reference.
     pub images: Vec<ImageRecord>,
     /// Every pair tried, sorted.
     pub pairs: Vec<PairRecord>,
     /// Vanishing-point guidance.
     pub manhattan: ManhattanRecord,
-    /// How upright, straight and well aligned it is, by its own lines and matches; `None` for a single photograph, and in
-    /// files of programs that did not measure.
+    /// How upright, straight and well aligned it is, by its own lines and matches; `None` for a single photograph, and
+    /// in files of programs that did not measure.
     #[serde(default)]
     pub measures: Option<Measures>,
     /// Size of the panorama.
@@ -383,27 +276,28 @@ pub struct Project {
     /// Name of the color space it was composed in; empty in files of programs that knew one only.
     #[serde(default, alias = "colour_space")]
     pub color_space: String,
-    /// What the cameras' response adds to that space's transfer curve: all factors act on the light by it. Nothing in files
-    /// of programs that estimated none.
+    /// What the cameras' response adds to that space's transfer curve: all factors act on the light by it. Nothing in
+    /// files of programs that estimated none.
     #[serde(default)]
     pub response: Response,
-    /// The light that the photographs were handed out in, where what is brighter than white is kept: those of stacks are merged then.
+    /// The light that the photographs were handed out in, where what is brighter than white is kept: those of stacks
+    /// are merged then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub light: Option<LightRange>,
     /// How directions were drawn; `None` where the panorama is the mesh itself, and in files of programs that knew no
     /// projections.
     #[serde(default)]
     pub projection: Option<ProjectionRecord>,
-    /// What of the canvas was kept; `None` where it was not to be cropped, before it is composed, and in files of programs that did
-    /// not record it.
+    /// What of the canvas was kept; `None` where it was not to be cropped, before it is composed, and in files of
+    /// programs that did not record it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crop: Option<CropRecord>,
-    /// The canvas of the plane in which the grids were solved, where that is not the panorama's: with a projection, or where
-    /// the panorama is a part of it.
+    /// The canvas of the plane in which the grids were solved, where that is not the panorama's: with a projection, or
+    /// where the panorama is a part of it.
     #[serde(default)]
     pub mesh_canvas: Option<Canvas>,
-    /// Where directions of the level world lie on `mesh_canvas`, if the mesh was worse than the cameras, so that these drew
-    /// the panorama.
+    /// Where directions of the level world lie on `mesh_canvas`, if the mesh was worse than the cameras, so that these
+    /// drew the panorama.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub by_cameras: Option<CameraPlane>,
     /// How the photographs were told to show a flat scene from places of their own; `None` for rotating cameras.
@@ -449,13 +343,14 @@ impl ImageRecord {
         }
     }
 
-    /// Rows of the rotation from the levelled world to the camera, as the photograph's own lines correct it where that is
-    /// recorded.
+    /// Rows of the rotation from the levelled world to the camera, as the photograph's own lines correct it where that
+    /// is recorded.
     pub(crate) fn level_rotation(&self) -> Option<&[[f64; 3]; 3]> {
         self.upright_rotation.as_ref().or(self.rotation.as_ref())
     }
 
-    /// The camera in the photograph's own pixels, with the rotation of these rows; `None` where no focal length is known.
+    /// The camera in the photograph's own pixels, with the rotation of these rows; `None` where no focal length is
+    /// known.
     pub fn camera(&self, camera_from_world: &[[f64; 3]; 3]) -> Option<Camera> {
         let (width, height) = (self.width as f64, self.height as f64);
         let pinhole = Camera::new(self.focal_px?, width, height, &matrix_from_rows(camera_from_world));
@@ -507,8 +402,8 @@ impl Project {
         (0..self.images.len()).filter(|&position| self.images[position].status == ImageStatus::Used).collect()
     }
 
-    /// The names by which people know the photographs, in the order of [`Self::images`]: file names, with as much of their
-    /// folders as tells them apart.
+    /// The names by which people know the photographs, in the order of [`Self::images`]: file names, with as much of
+    /// their folders as tells them apart.
     pub fn photograph_names(&self) -> Vec<String> {
         let paths: Vec<&Path> = self.images.iter().map(|image| Path::new(&image.path)).collect();
         unique_names(&paths)
@@ -519,8 +414,8 @@ impl Project {
         self.used_images().count()
     }
 
-    /// Forgets what evened out the light of its photographs: composing from it evens out that of the photographs that are shown.
-    /// For those of another shot, whose light is another.
+    /// Forgets what evened out the light of its photographs: composing from it evens out that of the photographs that
+    /// are shown. For those of another shot, whose light is another.
     pub fn forget_light(&mut self) {
         self.response = Response::default();
         for image in &mut self.images {
@@ -540,7 +435,8 @@ impl Project {
     /// Reads a project file's text. `file` is its name, for messages.
     ///
     /// # Errors
-    /// [`trueup_core::Error::Input`] if it is no project, damaged, or of a later version, or if numbers in it cannot be.
+    /// [`trueup_core::Error::Input`] if it is no project, damaged, or of a later version, or if numbers in it cannot
+    /// be.
     pub fn from_json(text: &str, file: &str) -> trueup_core::Result<Self> {
         let wrong = |reason: String| {
             trueup_core::Error::input(file, reason, "Give a file that `trueup stitch --project` wrote.")

@@ -14,8 +14,8 @@ use crate::report::several::several;
 /// The recorded photographs themselves, in the order of `records`.
 ///
 /// # Errors
-/// [`Error::Input`] that names every one that is missing, unreadable or of another size, or a file that would stand for two;
-/// [`Error::Cancelled`].
+/// [`Error::Input`] that names every one that is missing, unreadable or of another size, or a file that would stand for
+/// two; [`Error::Cancelled`].
 pub(crate) fn recorded_photographs(
     records: &[&ImageRecord],
     project_folder: &Path,
@@ -28,7 +28,8 @@ pub(crate) fn recorded_photographs(
     refuse_one_for_two(records, &found, hint).map(|()| found)
 }
 
-/// Refuses a file that was found for two recorded photographs, whose names are the same where their folders are not looked at.
+/// Refuses a file that was found for two recorded photographs, whose names are the same where their folders are not
+/// looked at.
 fn refuse_one_for_two(records: &[&ImageRecord], found: &[SourceImage], hint: &str) -> Result<()> {
     let mut taken: BTreeMap<PathBuf, &str> = BTreeMap::new();
     for (record, image) in records.iter().zip(found) {
@@ -47,7 +48,8 @@ fn refuse_one_for_two(records: &[&ImageRecord], found: &[SourceImage], hint: &st
 /// Other photographs of the same sizes, in the order of `records`: each of `names` is one, a file or in memory.
 ///
 /// # Errors
-/// [`Error::Input`] if there are more or fewer of them, or one cannot be read or has another size; [`Error::Cancelled`].
+/// [`Error::Input`] if there are more or fewer of them, or one cannot be read or has another size;
+/// [`Error::Cancelled`].
 pub(crate) fn named_photographs(
     records: &[&ImageRecord],
     names: &[String],
@@ -75,8 +77,8 @@ pub(crate) fn named_photographs(
 /// extensions, or, if not one name is known and there are as many files as records, by the natural order of names.
 ///
 /// # Errors
-/// [`Error::Input`] that names every photograph that has no replacement, or whose replacement has another size, or a file that would replace
-/// two; [`Error::Cancelled`].
+/// [`Error::Input`] that names every photograph that has no replacement, or whose replacement has another size, or a
+/// file that would replace two; [`Error::Cancelled`].
 pub(crate) fn other_photographs(
     records: &[&ImageRecord],
     folder: &Path,
@@ -111,8 +113,8 @@ pub(crate) fn other_photographs(
     refuse_one_for_two(records, &found, hint).map(|()| found)
 }
 
-/// The other exposures of a recorded photograph among others of the same names, or of these without extensions; none where one of them is
-/// not there: the photograph then stands for itself.
+/// The other exposures of a recorded photograph among others of the same names, or of these without extensions; none
+/// where one of them is not there: the photograph then stands for itself.
 fn replaced_stack(record: &ImageRecord, others: &[SourceImage]) -> Vec<StackMember> {
     let replaced = |member: &StackMemberRecord| {
         let name = member.file_name();

@@ -31,9 +31,9 @@ struct Overlap {
 }
 
 impl Stitcher<'_> {
-    /// The brightness of photographs that were joined, where both lie on the canvas of `alignment`. Every photograph is rendered
-    /// alone there, twice, which takes five bytes for each of its pixels: meant for small canvases. Pairs without a common
-    /// pixel are left out.
+    /// The brightness of photographs that were joined, where both lie on the canvas of `alignment`. Every photograph is
+    /// rendered alone there, twice, which takes five bytes for each of its pixels: meant for small canvases. Pairs
+    /// without a common pixel are left out.
     ///
     /// # Errors
     /// Those of reading the photographs; [`trueup_core::Error::Cancelled`].
@@ -111,7 +111,8 @@ mod tests {
         Layer { left, top: 0, gray, covered: Raster::from_data(4, 2, 1, vec![true; 8]).expect("eight samples") }
     }
 
-    /// Columns 0 to 3 and 2 to 5 share two columns of two rows; on a turn of 6 columns, 4 to 7 share 0 and 1 with the first.
+    /// Columns 0 to 3 and 2 to 5 share two columns of two rows; on a turn of 6 columns, 4 to 7 share 0 and 1 with the
+    /// first.
     #[test]
     fn the_difference_is_taken_where_both_are() {
         let flat = overlap(&layer(0, 100.0), &layer(2, 90.0), None);

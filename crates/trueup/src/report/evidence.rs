@@ -11,7 +11,8 @@ use trueup_core::source::WorkingFrame;
 use crate::pipeline::align::Geometry;
 use crate::pipeline::align::component::Component;
 
-/// Lines and matches of the photographs that make a panorama, from its stitching: what another view of it is measured by, too.
+/// Lines and matches of the photographs that make a panorama, from its stitching: what another view of it is measured
+/// by, too.
 #[derive(Debug)]
 pub(crate) struct Evidence {
     /// In the order of the panorama's grids.
@@ -30,8 +31,8 @@ pub(crate) struct EvidencePhotograph {
     pub frame: WorkingFrame,
     /// Its camera, in working pixels.
     pub camera: Camera,
-    /// Its vertical lines, in working pixels: those that carry the vertical that the lines of all photographs tell, or where these tell none, that it
-    /// has by itself.
+    /// Its vertical lines, in working pixels: those that carry the vertical that the lines of all photographs tell, or
+    /// where these tell none, that it has by itself.
     pub vertical_lines: Vec<LineSegment>,
     /// The roll that the lines of all photographs tell.
     pub roll: Option<EstimatedRoll>,

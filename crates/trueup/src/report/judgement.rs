@@ -50,30 +50,33 @@ impl fmt::Display for Verdict {
 
 /// Limits of the lean, 95 % sure, in degrees: a degree is seen beside a straight edge, three without one.
 const LEAN_DEG: [f64; 2] = [1.0, 3.0];
-/// Limits of how far apart 95 of 100 matched points may land, as shares of the photographs' longer side: what is a pixel on
-/// a screen that shows a whole photograph, and four.
+/// Limits of how far apart 95 of 100 matched points may land, as shares of the photographs' longer side: what is a
+/// pixel on a screen that shows a whole photograph, and four.
 const APART: [f64; 2] = [1.0 / 2000.0, 1.0 / 500.0];
 /// The same in pixels, which no photograph is too small for: blending hides a pixel and a half.
 const LEAST_APART_PX: [f64; 2] = [1.5, 4.0];
-/// Limits of how far a long line may stray, as shares of its length: what counts as bent, and what testers of wide-angle lenses call strong
-/// distortion, whether the mesh bends the line or a view that is too wide for a plane.
+/// Limits of how far a long line may stray, as shares of its length: what counts as bent, and what testers of
+/// wide-angle lenses call strong distortion, whether the mesh bends the line or a view that is too wide for a plane.
 const BENT: [f64; 2] = [BENT_SHARE, 0.02];
 
 /// A plain word for every figure that was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Judgement {
-    /// How upright it is: by the widest lean that is probable, beyond that by which the viewer's head was asked to be turned. `None` where the
-    /// viewer was asked to look up or down, from where upright things lean wherever cameras are right.
+    /// How upright it is: by the widest lean that is probable, beyond that by which the viewer's head was asked to be
+    /// turned. `None` where the viewer was asked to look up or down, from where upright things lean wherever cameras
+    /// are right.
     pub upright: Option<Verdict>,
     /// How well photographs meet: by the distances of matched points.
     pub alignment: Option<Verdict>,
-    /// How straight lines are: by the longest that is bent. `None` for a full turn, which bows level lines wherever cameras are right; a viewer
-    /// that looks round in it shows them straight; and for a view asked to look up or down that is not flat, which bows them as well.
+    /// How straight lines are: by the longest that is bent. `None` for a full turn, which bows level lines wherever
+    /// cameras are right; a viewer that looks round in it shows them straight; and for a view asked to look up or down
+    /// that is not flat, which bows them as well.
     pub lines: Option<Verdict>,
 }
 
 impl Project {
-    /// What the measures that were recorded mean; `None` for figures that were not measured, or say nothing of this panorama.
+    /// What the measures that were recorded mean; `None` for figures that were not measured, or say nothing of this
+    /// panorama.
     pub fn judgement(&self) -> Judgement {
         let Some(measures) = &self.measures else { return Judgement::default() };
         let upright = self.upright_deg(measures);
@@ -88,7 +91,8 @@ impl Project {
         }
     }
 
-    /// The widest lean that is probable, degrees, that nobody asked for; `None` where it was not measured or says nothing.
+    /// The widest lean that is probable, degrees, that nobody asked for; `None` where it was not measured or says
+    /// nothing.
     fn upright_deg(&self, measures: &Measures) -> Option<f64> {
         let upright = measures.upright.as_ref()?;
         let asked = self.asked_view();
@@ -114,24 +118,25 @@ impl Project {
         self.projection.map(|_| &self.options.arrange.projection)
     }
 
-    /// How far apart 95 of 100 matched points may land for the alignment to be good, and to be fair, in the photographs' own
-    /// pixels.
+    /// How far apart 95 of 100 matched points may land for the alignment to be good, and to be fair, in the
+    /// photographs' own pixels.
     pub fn limits_apart_px(&self) -> [f64; 2] {
         let side = self.used_images().map(|image| image.width.max(image.height)).max().unwrap_or(0) as f64;
         [0, 1].map(|limit| (APART[limit] * side).max(LEAST_APART_PX[limit]))
     }
 }
 
-/// The widest lean of a photograph that is probable beyond what the viewer's head turned clockwise by `asked_roll` makes of upright things,
-/// degrees: all round, they lean the other way by up to as much. None at all is no fault either, as where the turn was asked for to mend one.
+/// The widest lean of a photograph that is probable beyond what the viewer's head turned clockwise by `asked_roll`
+/// makes of upright things, degrees: all round, they lean the other way by up to as much. None at all is no fault
+/// either, as where the turn was asked for to mend one.
 fn widest_lean_deg(photograph: &PhotographMeasures, asked_roll: f64) -> Option<f64> {
     let lean = photograph.lean_deg?;
     let asked_for = lean.clamp((-asked_roll).min(0.0), (-asked_roll).max(0.0));
     Some((lean - asked_for).abs() + photograph.within_deg.unwrap_or(0.0))
 }
 
-/// Whether lines and pixels aligned the overlaps, as asked or, as was `told`, because of parallax, or the cameras draw the photographs, of which these
-/// move little: nothing more can be asked for.
+/// Whether lines and pixels aligned the overlaps, as asked or, as was `told`, because of parallax, or the cameras draw
+/// the photographs, of which these move little: nothing more can be asked for.
 fn asked_all_evidence(project: &Project, told: &[Diagnostic]) -> bool {
     let settles = |found: &Diagnostic| [PARALLAX, DRAWN_BY_CAMERAS].contains(&found.code.as_str());
     project.options.align.stitch.align == Evidence::LinesPhotometric || told.iter().any(settles)
@@ -358,7 +363,8 @@ mod tests {
         assert_eq!(project.judgement().lines, None);
     }
 
-    /// Of a head turned clockwise, upright things lean to the left; from above, they lean to all sides and lines are bowed.
+    /// Of a head turned clockwise, upright things lean to the left; from above, they lean to all sides and lines are
+    /// bowed.
     #[test]
     fn a_view_that_was_asked_for_is_no_fault() {
         let mut project = project(3.5, 1.0, 31.8);

@@ -15,7 +15,8 @@ pub(crate) struct LeftOut {
     pub hint: String,
 }
 
-/// Why the photographs `members`, which overlap one another, are in no panorama: another one is stitched. The same for each of them, so that they are told together.
+/// Why the photographs `members`, which overlap one another, are in no panorama: another one is stitched. The same for
+/// each of them, so that they are told together.
 pub(crate) fn of_another_panorama(members: &[usize], names: &[String]) -> LeftOut {
     let of = match members {
         [one, other] => format!("that of {} and {}", names[*one], names[*other]),
@@ -139,7 +140,8 @@ pub(crate) fn none_usable(inputs: Vec<(String, String, String)>) -> Error {
     }
 }
 
-/// What to do where nothing can be used: what is said of each file, if that is one thing but for the command that does it, of which each is named.
+/// What to do where nothing can be used: what is said of each file, if that is one thing but for the command that does
+/// it, of which each is named.
 fn hint_of_all<'a>(hints: impl Iterator<Item = &'a str>) -> String {
     /// What stands before a command.
     const COMMAND: &str = "for example with ";

@@ -9,8 +9,8 @@ pub(crate) const HUNDREDTHS: f64 = 100.0;
 /// Photographs whose lean is certain that a panorama needs for an uprightness of its own: fewer have none in common.
 pub const FEWEST_CERTAIN: usize = 2;
 
-/// Which way something leans that leans clockwise by `lean_deg` degrees, as words to follow "leans": " to the left" or " to the right".
-/// Empty where the size is zero as it is shown, with so many `decimals`.
+/// Which way something leans that leans clockwise by `lean_deg` degrees, as words to follow "leans": " to the left" or
+/// " to the right". Empty where the size is zero as it is shown, with so many `decimals`.
 pub fn lean_side(lean_deg: f64, decimals: usize) -> &'static str {
     let shown = format!("{:.decimals$}", lean_deg.abs());
     match shown.parse() == Ok(0.0) {
@@ -25,8 +25,8 @@ pub fn lean_side(lean_deg: f64, decimals: usize) -> &'static str {
 pub struct Measures {
     /// How upright it is by all its lines; `None` if fewer than [`FEWEST_CERTAIN`] photographs are certain.
     pub upright: Option<UprightMeasures>,
-    /// Estimate of the paper's GDIC, with each photograph's roll by the lines of all of them in place of its true angle.
-    /// Over the photographs that are certain; `None` with fewer than two.
+    /// Estimate of the paper's GDIC, with each photograph's roll by the lines of all of them in place of its true
+    /// angle. Over the photographs that are certain; `None` with fewer than two.
     pub estimated_gdic_deg: Option<f64>,
     /// How far apart matched points land; `None` without matches.
     pub reprojection: Option<ReprojectionMeasures>,
@@ -41,8 +41,8 @@ pub struct Measures {
     /// Each photograph's own figures, in the order of the photographs used.
     #[serde(rename = "pictures")]
     pub photographs: Vec<PhotographMeasures>,
-    /// Where matched points land how far apart, of every pair whose overlap was to coincide. Empty in projects of earlier
-    /// versions.
+    /// Where matched points land how far apart, of every pair whose overlap was to coincide. Empty in projects of
+    /// earlier versions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pairs: Vec<PairMeasures>,
 }
@@ -69,8 +69,8 @@ pub struct PairMeasures {
     pub mean_px: f64,
     /// 95 of 100 are not farther apart.
     pub percentile_95_px: f64,
-    /// The same by places: squares of a sixteenth of the longer side of the first photograph, as far as there are matches in
-    /// them, row after row.
+    /// The same by places: squares of a sixteenth of the longer side of the first photograph, as far as there are
+    /// matches in them, row after row.
     pub places: Vec<PlaceMeasures>,
 }
 
@@ -181,15 +181,17 @@ pub struct BentLine {
 pub struct PhotographMeasures {
     /// Path of the photograph.
     pub path: String,
-    /// Its vertical lines: those that carry the vertical that the lines of all photographs tell; where these tell none, those of its own.
+    /// Its vertical lines: those that carry the vertical that the lines of all photographs tell; where these tell none,
+    /// those of its own.
     pub vertical_lines: usize,
-    /// By how much what is vertical leans clockwise in the panorama where its vertical lines are, in the mean of these; `None` if the lines of
-    /// all photographs do not tell, straight up or down, and where fewer than three of its own, or no more than chance shows, carry the vertical.
+    /// By how much what is vertical leans clockwise in the panorama where its vertical lines are, in the mean of these;
+    /// `None` if the lines of all photographs do not tell, straight up or down, and where fewer than three of its own,
+    /// or no more than chance shows, carry the vertical.
     pub lean_deg: Option<f64>,
     /// Standard error of the lean.
     pub standard_error_deg: Option<f64>,
-    /// Half the interval around `lean_deg` that holds the true lean with a probability of 95 %. `None` also in projects of
-    /// earlier versions.
+    /// Half the interval around `lean_deg` that holds the true lean with a probability of 95 %. `None` also in projects
+    /// of earlier versions.
     #[serde(default)]
     pub within_deg: Option<f64>,
     /// Angle in the photograph from its down to the vertical.

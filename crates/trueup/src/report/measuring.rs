@@ -20,11 +20,11 @@ use super::measures::{
 use crate::pipeline::arrange::Arrangement;
 use crate::project::record::ImageRecord;
 
-/// A photograph whose lean is less sure than this, half the width of its 95 % interval, has no figure: a lean of a degree is
-/// seen. Degrees.
+/// A photograph whose lean is less sure than this, half the width of its 95 % interval, has no figure: a lean of a
+/// degree is seen. Degrees.
 const WIDEST_DEG: f64 = 1.0;
-/// Squares along the longer side of a photograph by which distances of matches are gathered: as fine as a look at the whole
-/// panorama tells apart.
+/// Squares along the longer side of a photograph by which distances of matches are gathered: as fine as a look at the
+/// whole panorama tells apart.
 const PLACES_ALONG_A_SIDE: f64 = 16.0;
 
 /// A photograph's lean in the panorama, where its upright lines are, and the roll it follows from. Radians.
@@ -34,8 +34,8 @@ struct Lean {
     by: EstimatedRoll,
 }
 
-/// The part of the plane that a panorama shows: its canvas, all round where that is a turn. What lies beside it is not measured, since
-/// nobody sees it.
+/// The part of the plane that a panorama shows: its canvas, all round where that is a turn. What lies beside it is not
+/// measured, since nobody sees it.
 #[derive(Debug, Clone, Copy)]
 struct ShownPart {
     size: [f64; 2],
@@ -56,8 +56,8 @@ impl Lean {
     }
 }
 
-/// Measures a panorama as it is delivered, whatever it is drawn on, by what its photographs show. Of the project's `images` only
-/// their names are asked.
+/// Measures a panorama as it is delivered, whatever it is drawn on, by what its photographs show. Of the project's
+/// `images` only their names are asked.
 pub(crate) fn run(evidence: &Evidence, arrangement: &Arrangement, images: &[ImageRecord]) -> Measures {
     let period = arrangement.drawn.period.map(|columns| columns as f64);
     let CanvasLayout { width, height, .. } = arrangement.drawn;
@@ -106,8 +106,8 @@ pub(crate) fn run(evidence: &Evidence, arrangement: &Arrangement, images: &[Imag
     }
 }
 
-/// The lean of a photograph whose vertical the lines of all of them tell, on its grid. `None` where too few of its own carry it: nothing there would be
-/// seen to lean.
+/// The lean of a photograph whose vertical the lines of all of them tell, on its grid. `None` where too few of its own
+/// carry it: nothing there would be seen to lean.
 fn lean(mesh: &GridMesh, photograph: &EvidencePhotograph, part: ShownPart) -> Option<Lean> {
     let by = photograph.roll?;
     let is_shown = |line: &&LineSegment| {

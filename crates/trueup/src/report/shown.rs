@@ -20,8 +20,8 @@ pub struct ShownPhotographs {
 }
 
 impl Alignment {
-    /// Which photograph what was `rendered` of this shows where, on a raster of `width` x `height` places over the whole
-    /// panorama; `None` where photographs were averaged.
+    /// Which photograph what was `rendered` of this shows where, on a raster of `width` x `height` places over the
+    /// whole panorama; `None` where photographs were averaged.
     pub fn shown(&self, rendered: &Rendered, [width, height]: [usize; 2]) -> Option<ShownPhotographs> {
         let canvas = [self.layout().width, self.layout().height];
         let labels = rendered.seams.as_ref()?.on_places(&self.kept(), canvas, [width, height]);
@@ -32,8 +32,8 @@ impl Alignment {
         Some(ShownPhotographs { width, height, positions: labels.into_iter().map(position).collect() })
     }
 
-    /// The photograph in use at this position of [`crate::Project::images`], reduced to at most `max_pixels`: 8-bit RGB in the
-    /// color space of the panorama, as it was taken; `None` if it is not used.
+    /// The photograph in use at this position of [`crate::Project::images`], reduced to at most `max_pixels`: 8-bit RGB
+    /// in the color space of the panorama, as it was taken; `None` if it is not used.
     ///
     /// # Errors
     /// Those of decoding it.

@@ -5,19 +5,19 @@ use trueup_core::camera::Camera;
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::geometry::orthonormal_complement;
 
-/// Photographs sweep farther than this only about the vertical: up and down, people look from 30 degrees below the horizon to
-/// the zenith at most. Degrees.
+/// Photographs sweep farther than this only about the vertical: up and down, people look from 30 degrees below the
+/// horizon to the zenith at most. Degrees.
 const LEAST_SWEEP_DEG: f64 = 125.0;
 
-/// Most that the axis of the sweep may lean to the side of a photograph that lies on its side: people hold the camera level to
-/// a few degrees, and tilt it up and down by more. Degrees.
+/// Most that the axis of the sweep may lean to the side of a photograph that lies on its side: people hold the camera
+/// level to a few degrees, and tilt it up and down by more. Degrees.
 const MOST_LEAN_DEG: f64 = 30.0;
 
 /// Fewer photographs make no sweep.
 const FEWEST: usize = 3;
 
-/// A warning if the camera went all its way along the photographs' own up and down, farther than anybody looks up and down:
-/// then the vertical lies along their rows, and lines that are upright beside it are level in truth.
+/// A warning if the camera went all its way along the photographs' own up and down, farther than anybody looks up and
+/// down: then the vertical lies along their rows, and lines that are upright beside it are level in truth.
 pub(crate) fn warning(cameras: &[Camera], members: &[usize]) -> Option<Diagnostic> {
     let first = *members.first()?;
     let sweep = sweep_on_side(cameras)?;
@@ -32,8 +32,8 @@ pub(crate) fn warning(cameras: &[Camera], members: &[usize]) -> Option<Diagnosti
     ))
 }
 
-/// By how many degrees the camera turned about an axis along the rows of all photographs, if it did so by more than people
-/// look up and down.
+/// By how many degrees the camera turned about an axis along the rows of all photographs, if it did so by more than
+/// people look up and down.
 fn sweep_on_side(cameras: &[Camera]) -> Option<f64> {
     if cameras.len() < FEWEST {
         return None;

@@ -23,8 +23,8 @@ use super::tasks::{
 use crate::options::StitchOptions;
 use crate::pipeline::measured::Measured;
 
-/// Pairs that a task matches. One takes a thread a few hundredths of a second; neighboring pairs have photographs in common, which are
-/// handed over once for all of them.
+/// Pairs that a task matches. One takes a thread a few hundredths of a second; neighboring pairs have photographs in
+/// common, which are handed over once for all of them.
 const PAIRS_PER_TASK: usize = 64;
 
 /// The workers of a stitcher, with its options.
@@ -45,8 +45,8 @@ impl<'a> Division<'a> {
         Self { workers, options }
     }
 
-    /// What workers measure of `photographs`, with their numbers; those of which they find nothing are left out, as are those that
-    /// only this program holds.
+    /// What workers measure of `photographs`, with their numbers; those of which they find nothing are left out, as are
+    /// those that only this program holds.
     ///
     /// # Errors
     /// Those of the workers; [`trueup_core::Error::Cancelled`].
@@ -137,8 +137,8 @@ impl<'a> Division<'a> {
     }
 }
 
-/// The photographs as other programs find them; `None` if they cannot: pixels in memory, marked parts, and the range of light that is
-/// brighter than white, are only here.
+/// The photographs as other programs find them; `None` if they cannot: pixels in memory, marked parts, and the range of
+/// light that is brighter than white, are only here.
 fn elsewhere(files: &FilePhotographs) -> Option<Vec<SourceImage>> {
     if files.light().is_some() {
         return None;

@@ -7,11 +7,12 @@ use trueup_core::Result;
 use super::Workers;
 use super::tasks::{Common, damaged, read, written};
 
-/// Photographs that a task measures or makes small. One of 12 million pixels takes a thread about half a second: the task lasts long
-/// enough that handing it over is nothing beside it, and little is lost with a worker that is killed.
+/// Photographs that a task measures or makes small. One of 12 million pixels takes a thread about half a second: the
+/// task lasts long enough that handing it over is nothing beside it, and little is lost with a worker that is killed.
 pub(super) const PHOTOGRAPHS_PER_TASK: usize = 8;
 
-/// Bytes of tasks that are held at once: enough for hundreds of workers, and a small part of the memory of who hands them out.
+/// Bytes of tasks that are held at once: enough for hundreds of workers, and a small part of the memory of who hands
+/// them out.
 const BYTES_HELD: usize = 256_000_000;
 
 /// Has `count` tasks done, as many held at a time as [`BYTES_HELD`] allow, and hands what each gave to `take`.

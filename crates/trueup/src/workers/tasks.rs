@@ -63,7 +63,8 @@ pub(super) struct Placement {
 /// The numbers of the photographs to be measured.
 pub(super) type MeasureTask = Vec<usize>;
 
-/// What is known of each of them, in their order; `None` where it could not be found out, which is found out again by who asked.
+/// What is known of each of them, in their order; `None` where it could not be found out, which is found out again by
+/// who asked.
 pub(super) type MeasureResult = Vec<Option<Reported<Measured>>>;
 
 /// Pairs to be matched.

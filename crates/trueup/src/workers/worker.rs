@@ -18,7 +18,8 @@ use crate::pipeline::photographs::{FoundPhotographs, PhotographSet};
 use crate::pipeline::shelf::Shelf;
 use crate::pipeline::{composing_resources, scratch_folder};
 
-/// Does tasks that a [`Stitcher`](crate::Stitcher) hands out by [`Workers`](super::Workers), in whatever program it did not itself.
+/// Does tasks that a [`Stitcher`](crate::Stitcher) hands out by [`Workers`](super::Workers), in whatever program it did
+/// not itself.
 #[derive(Debug)]
 pub struct Worker {
     common: Common,
@@ -27,11 +28,12 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Gets ready for tasks that have `common` in common. Where photographs are looked at, their headers are read, and what is
-    /// decoded of a small set is kept for further tasks.
+    /// Gets ready for tasks that have `common` in common. Where photographs are looked at, their headers are read, and
+    /// what is decoded of a small set is kept for further tasks.
     ///
     /// # Errors
-    /// [`Error::Input`] if another version of the program wrote `common`; [`Error::Limits`] if a photograph is too large for the memory.
+    /// [`Error::Input`] if another version of the program wrote `common`; [`Error::Limits`] if a photograph is too
+    /// large for the memory.
     pub fn new(common: &[u8], context: &StageContext) -> Result<Self> {
         let common: Common = read(common)?;
         if common.program != PROGRAM {

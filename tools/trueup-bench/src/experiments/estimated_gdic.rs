@@ -17,8 +17,8 @@ pub(crate) const NAME: &str = "estimated-gdic";
 /// Spearman's correlation from which the estimate ranks panoramas as the truth does.
 const MIN_CORRELATION: f64 = 0.9;
 
-/// Every method with a prior and every warp for wide views on every set with known cameras: the work of the comparison of
-/// methods.
+/// Every method with a prior and every warp for wide views on every set with known cameras: the work of the comparison
+/// of methods.
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     Ok(methods_compared::trials(catalogue)?.into_iter().map(|trial| Trial { experiment: NAME, ..trial }).collect())
 }

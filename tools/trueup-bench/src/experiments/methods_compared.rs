@@ -1,4 +1,5 @@
-//! T2: local distortion and direction inconsistency of every method on whole sets, and the prior's error without a mesh.
+//! T2: local distortion and direction inconsistency of every method on whole sets, and the prior's error without a
+//! mesh.
 
 use trueup::Result;
 use trueup_report::charts::{Chart, Series, SeriesMark};

@@ -114,8 +114,8 @@ pub(crate) const EXPERIMENTS: [Experiment; 13] = [
 pub(crate) const QUICK_EXPERIMENTS: [&str; 4] =
     [methods_compared::NAME, robust_scheme::NAME, reference_choice::NAME, gate::NAME];
 
-/// The claims that are expected to hold on the few rough sets of a quick run ([`Claim::id`]): if one of them does not, a
-/// change broke something. The others are tried by the whole run alone: a handful of sets says little of them.
+/// The claims that are expected to hold on the few rough sets of a quick run ([`Claim::id`]): if one of them does not,
+/// a change broke something. The others are tried by the whole run alone: a handful of sets says little of them.
 pub(crate) const QUICK_CLAIMS: [&str; 6] =
     ["methods-distortion", "default-direction", "default-distortion", "robust-scheme", "reference-vpg", "gate"];
 
@@ -128,7 +128,8 @@ mod tests {
     use super::*;
     use crate::sets::GivenFolders;
 
-    /// A method that fixes options refuses other values of them: an experiment that asks for one would end the whole run.
+    /// A method that fixes options refuses other values of them: an experiment that asks for one would end the whole
+    /// run.
     #[test]
     fn every_trial_of_every_experiment_has_options_that_can_be() {
         for catalogue in [Catalogue::full(&GivenFolders::default()).expect("no folders"), Catalogue::quick()] {

@@ -15,8 +15,8 @@ use crate::trial::Trial;
 /// The experiment's name.
 pub(crate) const NAME: &str = "pitch-sweep";
 
-/// The relative roll as the paper words it, its sign mended, on the published mesh and with each photograph's own directions.
-/// `vpg-published` itself takes the roll that the common vertical means.
+/// The relative roll as the paper words it, its sign mended, on the published mesh and with each photograph's own
+/// directions. `vpg-published` itself takes the roll that the common vertical means.
 const TWIST: &str = "published mesh, twist as relative roll";
 
 fn variants() -> Vec<(&'static str, Vec<&'static str>)> {

@@ -18,7 +18,8 @@ pub(crate) const NAME: &str = "robust-scheme";
 /// Shares of the vanishing directions that are replaced by random ones.
 const NOISE_SHARES: [f64; 3] = [0.0, 0.1, 0.2];
 
-/// More photographs than this make a set large: its many photographs average the noise within one seed, and take their time.
+/// More photographs than this make a set large: its many photographs average the noise within one seed, and take their
+/// time.
 const MANY_PHOTOGRAPHS: usize = 20;
 /// Seeds for large sets.
 const SEEDS_OF_LARGE_SETS: u64 = 2;

@@ -17,7 +17,8 @@ use crate::trial::{Row, Trial};
 /// The experiment's name.
 pub(crate) const NAME: &str = "runtime";
 
-/// The method whose cost is looked at and those it is compared with: as published, which the claims are about, and by default.
+/// The method whose cost is looked at and those it is compared with: as published, which the claims are about, and by
+/// default.
 const CONTESTS: [Contest; 2] =
     [Contest { ours: VPG_PUBLISHED, gsp: GSP_3D_PUBLISHED }, Contest { ours: VPG, gsp: GSP_3D }];
 /// The stages between matches and panorama, and all of them from the photographs' files on.
@@ -26,7 +27,8 @@ const TOTAL: &str = "total";
 const GEOMETRY: &str = "geometry";
 /// The stages of [`GEOMETRY`].
 const GEOMETRY_STAGES: [&str; 5] = ["cameras", "match points", VANISHING, "prior", "mesh"];
-/// The stage that is run for every method, since a project records the directions, but serves those that heed them alone.
+/// The stage that is run for every method, since a project records the directions, but serves those that heed them
+/// alone.
 const VANISHING: &str = "vanishing points";
 /// VPG is to take at most this multiple of GSP-3D's time; the paper's own is 1.04 on its sets and 1.23 on GSP's.
 const MAX_RATIO: f64 = 1.25;
@@ -38,8 +40,8 @@ const REPEATS: usize = 3;
 const MANY_PHOTOGRAPHS: usize = 20;
 const REPEATS_OF_LARGE_SETS: usize = 2;
 
-/// VPG and GSP-3D on the same mesh; AANAP is compared with both, as the warp that its authors published and as turns on the
-/// published mesh.
+/// VPG and GSP-3D on the same mesh; AANAP is compared with both, as the warp that its authors published and as turns on
+/// the published mesh.
 #[derive(Debug, Clone, Copy)]
 struct Contest {
     ours: &'static str,
@@ -128,7 +130,8 @@ pub(crate) fn run(runner: &Runner, catalogue: &Catalogue) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Seconds per stage and in all of the fastest of some alignments; those of matching, which all methods share, included.
+/// Seconds per stage and in all of the fastest of some alignments; those of matching, which all methods share,
+/// included.
 fn fastest(
     stitcher: &Stitcher,
     photographs: &MatchedPhotographs,

@@ -100,7 +100,8 @@ fn placed_by_all(results: &Results, set: &SetSpec) -> Option<usize> {
     sizes(results, set, CLAIMED[0]).into_iter().find(all)
 }
 
-/// A figure of a warp and of VPG on the same photographs, as many as all warps place, for every set where there are any.
+/// A figure of a warp and of VPG on the same photographs, as many as all warps place, for every set where there are
+/// any.
 fn same_photographs(results: &Results, warp: &str, ours: &str, measure: &str) -> Vec<Pair> {
     let of_set = |set: &SetSpec| {
         let photographs = placed_by_all(results, set)?;

@@ -27,13 +27,15 @@ pub(super) struct QualityRow {
     pub guided: String,
     /// Vanishing point divergence.
     pub divergence: Option<f64>,
-    /// Deviation from upright, degrees: of the scene's vertical where it is known, else as the panorama's own lines tell it.
+    /// Deviation from upright, degrees: of the scene's vertical where it is known, else as the panorama's own lines
+    /// tell it.
     pub upright_deg: Option<f64>,
     /// The same of the worst photograph.
     pub upright_max_deg: Option<f64>,
     /// Local distortion, x 1e-2.
     pub ld: Option<f64>,
-    /// Global direction inconsistency, degrees; estimated from the lines of all photographs where the cameras are not known.
+    /// Global direction inconsistency, degrees; estimated from the lines of all photographs where the cameras are not
+    /// known.
     pub gdic_deg: Option<f64>,
     /// Alignment, source pixels: of true correspondences where they are known, else of matches.
     pub align_px: Option<f64>,

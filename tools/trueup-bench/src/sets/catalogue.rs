@@ -28,7 +28,8 @@ pub(crate) struct Catalogue {
     pub given: Vec<SetSpec>,
     /// Photographs of which nothing is known.
     pub photographs: Vec<SetSpec>,
-    /// Many small sets with and without dominant directions. Half of each class is held out: nothing was chosen by them.
+    /// Many small sets with and without dominant directions. Half of each class is held out: nothing was chosen by
+    /// them.
     pub gate: Vec<SetSpec>,
     /// Pairs of which one photograph is turned.
     pub rolled: Vec<RolledPair>,

@@ -7,9 +7,9 @@ use crate::statistics::median;
 /// Positions, ascending, of the `count` photographs around the middle one, and the position of that one.
 ///
 /// The middle one is of the half whose elevation is nearest the median (in a full turn of several rows, the photographs
-/// near a pole look least differently from all others) and has the least sum of angles to the viewing directions of all;
-/// nearest are those that look in the directions least different from its own, the earlier first where two are alike.
-/// `None` for a set without photographs.
+/// near a pole look least differently from all others) and has the least sum of angles to the viewing directions of
+/// all; nearest are those that look in the directions least different from its own, the earlier first where two are
+/// alike. `None` for a set without photographs.
 pub(crate) fn central(truth: &Truth, count: usize) -> Option<(usize, Vec<usize>)> {
     let views: Vec<_> = truth.images.iter().map(|image| image.camera_from_world().row(2).transpose()).collect();
     let elevations: Vec<f64> = views.iter().map(|view| view.y.asin()).collect();

@@ -41,8 +41,8 @@ fn with_exif(jpeg: &[u8], exif: &[u8]) -> Option<Vec<u8>> {
 
 const EXIF_HEADER: &[u8] = b"Exif\0\0";
 
-/// The TIFF structure of an EXIF block (EXIF 3.0, section 4.6): the focal length on a sensor 36 mm wide, the photograph's size,
-/// the sensor's resolution.
+/// The TIFF structure of an EXIF block (EXIF 3.0, section 4.6): the focal length on a sensor 36 mm wide, the
+/// photograph's size, the sensor's resolution.
 fn focal_exif(focal_px: f64, width: usize, height: usize) -> Vec<u8> {
     const SENSOR_MM: f64 = 36.0;
     /// Denominator of the rationals: numbers to a ten-thousandth.

@@ -5,8 +5,8 @@ use std::path::Path;
 use trueup::{Error, Result, StageContext};
 use trueup_scenes::cut::{LevelOptions, Panorama360, SpecKind, SpecOptions, cut_set, make_spec, measure_level};
 
-/// What is cut from every panorama, and of how many views each consists. Grids and full turns of as many panoramas would
-/// take longer than the rest of the report together: who wants them gives them with their truth.
+/// What is cut from every panorama, and of how many views each consists. Grids and full turns of as many panoramas
+/// would take longer than the rest of the report together: who wants them gives them with their truth.
 pub(super) const KINDS: [(SpecKind, usize); 2] = [(SpecKind::Row, 9), (SpecKind::Tilt, 6)];
 
 /// How many views a set of this kind has.

@@ -7,10 +7,12 @@ use trueup::{Error, Result, StageContext};
 use super::folders::{folders_in, name_of, photographs_in};
 use super::spec::{SetSpec, refuse_known};
 
-/// Sets named `group/FOLDER`: each of `folders` is one if it holds photographs itself, else those inside it are that do.
+/// Sets named `group/FOLDER`: each of `folders` is one if it holds photographs itself, else those inside it are that
+/// do.
 ///
 /// # Errors
-/// [`Error::Io`] for folders that cannot be read; [`Error::Input`] for one without photographs, or two sets of one name.
+/// [`Error::Io`] for folders that cannot be read; [`Error::Input`] for one without photographs, or two sets of one
+/// name.
 pub(super) fn sets(group: &str, folders: &[PathBuf]) -> Result<Vec<SetSpec>> {
     let context = StageContext::default();
     let holds = |folder: &Path| photographs_in(folder, &context).is_ok();

@@ -1,11 +1,12 @@
 //! The data set of the paper's authors, where a user has it.
 //!
-//! The paper says what is in it: 36 sets, 01 to 12 rendered with known cameras, 13 to 36 photographed with a telephone. It
-//! does not say how it is stored. Taken for granted is the least that any archive of it must have: a folder per set, named
-//! by its number, which holds the photographs. Cameras are read from a file beside them, [`CAMERAS`], into which whatever
-//! the archive states is easily brought: a line per photograph with its file name, its focal length in pixels and the nine
-//! numbers of the rotation from world to camera, row by row (x right, y down, z forward; the world's y points down).
-//! Lines that begin with `#` are remarks. A set without the file has no truth: it takes part where none is needed.
+//! The paper says what is in it: 36 sets, 01 to 12 rendered with known cameras, 13 to 36 photographed with a telephone.
+//! It does not say how it is stored. Taken for granted is the least that any archive of it must have: a folder per set,
+//! named by its number, which holds the photographs. Cameras are read from a file beside them, [`CAMERAS`], into which
+//! whatever the archive states is easily brought: a line per photograph with its file name, its focal length in pixels
+//! and the nine numbers of the rotation from world to camera, row by row (x right, y down, z forward; the world's y
+//! points down). Lines that begin with `#` are remarks. A set without the file has no truth: it takes part where none
+//! is needed.
 
 use std::fs;
 use std::path::Path;
@@ -20,8 +21,8 @@ const CAMERAS: &str = "cameras.txt";
 /// What is known of a set's cameras; `None` without a file of them.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read; [`Error::Input`] for lines that cannot be understood, rotations that are none,
-/// or photographs without a camera.
+/// [`Error::Io`] if the file cannot be read; [`Error::Input`] for lines that cannot be understood, rotations that are
+/// none, or photographs without a camera.
 pub(super) fn truth(folder: &Path, images: &[SourceImage]) -> Result<Option<Truth>> {
     let path = folder.join(CAMERAS);
     let text = match fs::read_to_string(&path) {
@@ -107,7 +108,8 @@ mod tests {
             (0..count).for_each(|index| write_photograph(&set.join(format!("{index}.png")), 60 * index));
         }
         fs::create_dir(folder.join("readme")).expect("folder");
-        // The second camera is rolled clockwise by 30 degrees: what is down in the world shows to the right of its down.
+        // The second camera is rolled clockwise by 30 degrees: what is down in the world shows to the right of its
+        // down.
         let cameras = "# file, focal length, rotation\n0.png 80 1 0 0 0 1 0 0 0 1\n\
                        1.png 82.5 0.8660254 0.5 0 -0.5 0.8660254 0 0 0 1\n";
         fs::write(folder.join("01").join(CAMERAS), cameras).expect("written");

@@ -33,8 +33,8 @@ struct MeasuredSet {
 /// Times all programs on all sets, and writes the table.
 ///
 /// # Errors
-/// Those of finding the photographs and trueup; of starting a program; of writing the table. A set that a program cannot stitch
-/// is a cell of the table.
+/// Those of finding the photographs and trueup; of starting a program; of writing the table. A set that a program
+/// cannot stitch is a cell of the table.
 pub(crate) fn run(arguments: &SpeedArguments) -> Result<ExitCode> {
     let cancel = stopping::cancel_token();
     let trueup = find_trueup(arguments.trueup.as_deref())?;

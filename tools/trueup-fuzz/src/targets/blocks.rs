@@ -7,8 +7,8 @@ xmlns:drone-dji=\"http://www.dji.com/drone-dji/1.0/\" xmlns:GPano=\"http://ns.go
 drone-dji:GimbalRollDegree=\"+1.25\" drone-dji:GimbalPitchDegree=\"-12.50\"><GPano:PosePitchDegrees>3</GPano:PosePitchDegrees>\
 <GPano:PoseRollDegrees>-4.5</GPano:PoseRollDegrees></rdf:Description></rdf:RDF></x:xmpmeta><?xpacket end=\"w\"?>";
 
-/// An EXIF block: orientation 6, a focal length of 24 mm, GPS directions; tag, type, number and value of every field (EXIF 3.0
-/// 4.6, TIFF 6.0 section 2).
+/// An EXIF block: orientation 6, a focal length of 24 mm, GPS directions; tag, type, number and value of every field
+/// (EXIF 3.0 4.6, TIFF 6.0 section 2).
 pub(super) fn exif() -> Vec<u8> {
     let field = |tag: u16, kind: u16, count: u32, value: u32| {
         [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()

@@ -5,7 +5,8 @@ use trueup_io::fuzzing::{read_color_profile, read_exif_block, read_maker_note as
 use super::blocks;
 use super::work::Work;
 
-/// Apple's maker note with an acceleration vector of -1/4, -39/40 and 1/8 g: name, one entry of a directory, its values.
+/// Apple's maker note with an acceleration vector of -1/4, -39/40 and 1/8 g: name, one entry of a directory, its
+/// values.
 fn apple_note() -> Vec<u8> {
     const VALUES_AT: u32 = 14 + 2 + 12 + 4;
     let mut note = b"Apple iOS\0\0\x01MM\0\x01\0\x08\0\x0a\0\0\0\x03".to_vec();

@@ -7,7 +7,8 @@ use trueup_server::fuzzing::Unreachable;
 
 use super::work::Work;
 
-/// How long an answer is waited for: news are told as long as somebody listens, and most answers come within a millisecond.
+/// How long an answer is waited for: news are told as long as somebody listens, and most answers come within a
+/// millisecond.
 const PATIENCE: Duration = Duration::from_millis(20);
 /// Requests after which a server is made anew, with an empty folder.
 const REQUESTS: u32 = 2000;

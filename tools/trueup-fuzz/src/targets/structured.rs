@@ -1,4 +1,5 @@
-//! Inputs that are made to be well formed, from bytes that decide what is in them: what comes after the first look at a text.
+//! Inputs that are made to be well formed, from bytes that decide what is in them: what comes after the first look at a
+//! text.
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use serde_json::{Value, json};
@@ -37,7 +38,8 @@ pub(super) fn options() -> Vec<Vec<u8>> {
     (1..=4).map(noise).chain([vec![0; SEED_BYTES]]).collect()
 }
 
-/// Sets options of any table to values of any kind, and asks of all that is accepted whether it is written as it was read.
+/// Sets options of any table to values of any kind, and asks of all that is accepted whether it is written as it was
+/// read.
 pub(super) fn read_options(_: &Work, input: &[u8]) {
     let mut drawn = Unstructured::new(input);
     let mut options = StitchOptions::default();

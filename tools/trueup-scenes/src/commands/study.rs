@@ -16,7 +16,8 @@ enum Kind {
     Twins,
     /// One vertical, horizontals at free angles, 1 to 4.
     Mixed,
-    /// Small sets for statistics, 1 to 130 with dominant directions (folder `manhattan`) and as many without (`random`).
+    /// Small sets for statistics, 1 to 130 with dominant directions (folder `manhattan`) and as many without
+    /// (`random`).
     Gate,
 }
 

@@ -1,8 +1,8 @@
 //! Views of known pose out of a panorama of 360 x 180 degrees.
 //!
-//! [`Panorama360`] holds the panorama, a [`CutSpec`] says which views to take, [`cut_set`] writes them with their truth.
-//! [`measure_level`] finds where the scene's vertical points in the panorama, which defines the world; [`make_spec`]
-//! makes specs of the usual kinds.
+//! [`Panorama360`] holds the panorama, a [`CutSpec`] says which views to take, [`cut_set`] writes them with their
+//! truth. [`measure_level`] finds where the scene's vertical points in the panorama, which defines the world;
+//! [`make_spec`] makes specs of the usual kinds.
 //!
 //! # Conventions
 //! * The panorama is equirectangular. Its frame has x right, y down, z forward; z points to the middle of the picture,

@@ -40,7 +40,8 @@ impl Panorama360 {
     /// Reads the panorama that `input` names: JPEG, PNG, TIFF or WebP. Its size is judged before memory is taken.
     ///
     /// # Errors
-    /// As [`find_panoramas`] and [`photograph`]; [`Error::Input`] if `input` is a folder or pattern of several pictures.
+    /// As [`find_panoramas`] and [`photograph`]; [`Error::Input`] if `input` is a folder or pattern of several
+    /// pictures.
     pub fn read(input: &str, context: &StageContext) -> Result<Self> {
         let images = find_panoramas(&[input.to_owned()], context)?;
         match images.as_slice() {

@@ -121,7 +121,8 @@ fn the_middle_of_a_view_looks_where_its_angles_say() {
     }
 }
 
-/// A vertical that leans to the right of the panorama by two degrees shows so ahead, and towards the viewer at the right.
+/// A vertical that leans to the right of the panorama by two degrees shows so ahead, and towards the viewer at the
+/// right.
 #[test]
 fn the_truth_refers_to_the_scenes_vertical() {
     let two_degrees = 2.0_f64.to_radians();

@@ -24,8 +24,8 @@ impl PinholeView {
         Self { camera: Camera::new(focal_px, width as f64, height as f64, camera_from_panorama), width, height }
     }
 
-    /// Takes the picture: each pixel is the mean of at least `least_samples` x `least_samples` interpolated samples, and
-    /// of more where the panorama is finer than that. `develop` is called once for every row and makes the bytes of
+    /// Takes the picture: each pixel is the mean of at least `least_samples` x `least_samples` interpolated samples,
+    /// and of more where the panorama is finer than that. `develop` is called once for every row and makes the bytes of
     /// its pixels from their colors, which are averaged as they are encoded.
     ///
     /// # Errors

@@ -113,7 +113,8 @@ impl Builder {
         BuilderCheckpoint { solids: self.solids.len(), portals: self.portals.len() }
     }
 
-    /// Turns all that was added since the checkpoint about the vertical through `pivot` by `yaw` radians, from z towards x.
+    /// Turns all that was added since the checkpoint about the vertical through `pivot` by `yaw` radians, from z
+    /// towards x.
     pub(crate) fn turn_since(&mut self, before: BuilderCheckpoint, pivot: Vector3<f64>, yaw: f64) {
         let rotation = rotation_about_y(yaw);
         for solid in &mut self.solids[before.solids..] {

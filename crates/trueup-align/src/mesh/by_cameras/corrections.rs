@@ -31,11 +31,11 @@ pub(super) struct CameraCorrections {
     pub relative_gradient: f64,
 }
 
-/// Pull of every vertex to where its camera sees it, as a share of that of a match point: fixes what matches leave open,
-/// a common turn of all photographs, and is not felt beside a match.
+/// Pull of every vertex to where its camera sees it, as a share of that of a match point: fixes what matches leave
+/// open, a common turn of all photographs, and is not felt beside a match.
 const REST_WEIGHT: f64 = 0.05;
-/// Times the equations are solved; the photographs' maps into each other are linear to a hundredth of a pixel over the steps
-/// that are left after the first.
+/// Times the equations are solved; the photographs' maps into each other are linear to a hundredth of a pixel over the
+/// steps that are left after the first.
 const ROUNDS: usize = 3;
 
 impl CameraCorrections {

@@ -105,8 +105,8 @@ fn lean(camera: &Camera, mesh: &GridMesh) -> f64 {
     mesh.lean_in_the_middle(roll_from_down(&(camera.rotation() * Vector3::y())))
 }
 
-/// Squared distance of a match point in the mesh, taken back to pixels of its photograph; `None` where the mesh lays the two
-/// a turn apart and is not closed, or has no area.
+/// Squared distance of a match point in the mesh, taken back to pixels of its photograph; `None` where the mesh lays
+/// the two a turn apart and is not closed, or has no area.
 fn mesh_misfit(mesh: &WarpedMesh, input: &ByCamerasInput, point: &CarriedPoint) -> Option<f64> {
     let severed = input.severed.binary_search(&(point.from.min(point.to), point.from.max(point.to))).is_ok();
     if severed && mesh.period.is_none() {

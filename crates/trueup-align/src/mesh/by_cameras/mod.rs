@@ -68,8 +68,8 @@ pub fn unless_worse(
     }))
 }
 
-/// The grids of photographs of which nothing is known but the cameras, in the level world: on a plane of so many units per radian.
-/// `grids` are over the photographs in the cameras' pixels.
+/// The grids of photographs of which nothing is known but the cameras, in the level world: on a plane of so many units
+/// per radian. `grids` are over the photographs in the cameras' pixels.
 pub fn drawn_by_cameras(cameras: &[Camera], grids: &[GridMesh], units_per_radian: f64) -> WarpedMesh {
     let seen = Seen { cameras, grids, dominant: None, subdivision: 1 };
     let Drawing { meshes, period, plane } = Drawing::of(&seen, units_per_radian, |_, pixel| pixel);

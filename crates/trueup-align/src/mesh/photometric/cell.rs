@@ -3,8 +3,8 @@
 use nalgebra::{Matrix2, Vector2};
 use trueup_core::mesh::GridMesh;
 
-/// The cell of a grid that was looked into last, as the polynomial that its bilinear map is: walks of small steps seldom
-/// leave it.
+/// The cell of a grid that was looked into last, as the polynomial that its bilinear map is: walks of small steps
+/// seldom leave it.
 pub(super) struct LastCell<'a> {
     grid: &'a GridMesh,
     /// The cell's first vertex.
@@ -12,7 +12,8 @@ pub(super) struct LastCell<'a> {
     /// Its corner in the photograph, and the reciprocal of its size.
     origin: Vector2<f64>,
     per_pixel: Vector2<f64>,
-    /// The place of the first vertex, what is added along the rows and the columns, and what both together add, per cell.
+    /// The place of the first vertex, what is added along the rows and the columns, and what both together add, per
+    /// cell.
     corner: Vector2<f64>,
     along: [Vector2<f64>; 2],
     twist: Vector2<f64>,
@@ -91,8 +92,8 @@ impl<'a> PixelWalk<'a> {
         self.last = None;
     }
 
-    /// The pixel that goes to `place`, by Newton's method from the last one or, where there is none, from what `start` gives;
-    /// `None` if it is not found, which is usual far outside the photograph. The pixel may lie outside.
+    /// The pixel that goes to `place`, by Newton's method from the last one or, where there is none, from what `start`
+    /// gives; `None` if it is not found, which is usual far outside the photograph. The pixel may lie outside.
     pub(super) fn to(&mut self, place: Vector2<f64>, start: impl FnOnce() -> Option<Vector2<f64>>) -> Option<Step> {
         /// Steps; each squares the error once it is in the right cell.
         const STEPS: usize = 12;

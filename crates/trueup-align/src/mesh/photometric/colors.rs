@@ -9,7 +9,8 @@ const MAX_GAIN: f64 = 4.0;
 /// Strength, in samples, with which the color difference in a cell is drawn to that of the whole overlap.
 const RIDGE: f64 = 10.0;
 
-/// Cells on every side that count as around one. Measured: with two, pairs of a gallery meet to 0.45 px and less instead of 0.26.
+/// Cells on every side that count as around one. Measured: with two, pairs of a gallery meet to 0.45 px and less
+/// instead of 0.26.
 const REACH: usize = 1;
 
 /// The second photograph's gray values as the first would show them: gain times value plus bias.
@@ -100,8 +101,9 @@ impl Fitted {
 }
 
 impl Colors {
-    /// Of every cell, drawn to that of the cells around it, which is drawn to that of the overlap: light falls off towards a photograph's corners, and by what is left of that in a cell with few samples, edges
-    /// would seem to be elsewhere.
+    /// Of every cell, drawn to that of the cells around it, which is drawn to that of the overlap: light falls off
+    /// towards a photograph's corners, and by what is left of that in a cell with few samples, edges would seem to be
+    /// elsewhere.
     pub(super) fn of(samples: &[Vec<PixelSample>], grid: &GridMesh) -> Self {
         let mut all = Moments::default();
         let mut cells = vec![Moments::default(); grid.len()];
@@ -145,8 +147,8 @@ mod tests {
     use super::super::pyramid::Gray;
     use super::*;
 
-    /// Twelve samples a cell, as along an edge, half at 60 and half at 160; the second photograph's light falls off to 0.7 from left to right. Drawn to all of the overlap alone, the outer
-    /// cells keep more than 6 gray levels of this.
+    /// Twelve samples a cell, as along an edge, half at 60 and half at 160; the second photograph's light falls off to
+    /// 0.7 from left to right. Drawn to all of the overlap alone, the outer cells keep more than 6 gray levels of this.
     #[test]
     fn light_that_falls_off_leaves_next_to_nothing_where_samples_are_few() {
         let grid = GridMesh::regular(320.0, 240.0, 40.0);

@@ -14,8 +14,8 @@ use crate::evidence::CommonSum;
 
 /// Half the width of a Tukey weight, in standard deviations: 95 % efficient for a Gaussian.
 const TUKEY: f64 = 4.685;
-/// Distance of the samples in the finest photographs, working px; twice as far in each coarser one. Edges are two to three
-/// pixels wide: at 4 px many are passed over, and NCC MSE is 1 % higher on four of five sets.
+/// Distance of the samples in the finest photographs, working px; twice as far in each coarser one. Edges are two to
+/// three pixels wide: at 4 px many are passed over, and NCC MSE is 1 % higher on four of five sets.
 const SPACING_PX: f64 = 3.0;
 /// The distance that the option `photometric.weight` belongs to.
 const WEIGHED_SPACING_PX: f64 = 4.0;

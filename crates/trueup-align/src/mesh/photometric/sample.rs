@@ -23,8 +23,8 @@ impl PixelSample {
         0.5 * (gain * self.gray[1].slope + self.gray[0].slope)
     }
 
-    /// The shares of the corners of the first photograph's cell (top left, top right, bottom right, bottom left), and of
-    /// the second's less than nothing: what the distance of the two places is made of.
+    /// The shares of the corners of the first photograph's cell (top left, top right, bottom right, bottom left), and
+    /// of the second's less than nothing: what the distance of the two places is made of.
     pub(super) fn shares(&self) -> [f64; 8] {
         let [[a, b, c, d], [e, f, g, h]] = self.within.map(|within| {
             let (u, v) = (within.x, within.y);

@@ -34,8 +34,8 @@ struct Lattice {
 }
 
 impl Lattice {
-    /// The lines of samples, of `count` in all, from `start` up to `end`; the last cell's, where there is no `end`, go to the
-    /// border.
+    /// The lines of samples, of `count` in all, from `start` up to `end`; the last cell's, where there is no `end`, go
+    /// to the border.
     fn between(&self, start: f64, end: Option<f64>, count: usize) -> Range<usize> {
         let first_from = |at: f64| ((at / self.spacing - 0.5).ceil().max(0.0) as usize).min(count);
         first_from(start)..end.map_or(count, first_from)

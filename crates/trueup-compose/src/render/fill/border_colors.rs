@@ -11,11 +11,12 @@ pub(super) struct BorderColors {
 }
 
 impl BorderColors {
-    /// From what is known of the borders at a level: the kind of color that is more of a wide part of the border, and by it that of ever smaller parts. Where
-    /// a roof meets the sky beside a gap, the mean of both is neither.
+    /// From what is known of the borders at a level: the kind of color that is more of a wide part of the border, and
+    /// by it that of ever smaller parts. Where a roof meets the sky beside a gap, the mean of both is neither.
     pub(super) fn of(known: &PyramidPlane<[f32; 4]>, level: u32) -> Self {
-        /// Levels above it that the kind is sought at: samples of 64 pixels on most canvases at first, of 32 at last, which see three times as far, so that a lamp or a
-        /// twig is the lesser part of what they see. From samples of 128, a sky is carried on over the clouds that lie beside the gap.
+        /// Levels above it that the kind is sought at: samples of 64 pixels on most canvases at first, of 32 at last,
+        /// which see three times as far, so that a lamp or a twig is the lesser part of what they see. From samples of
+        /// 128, a sky is carried on over the clouds that lie beside the gap.
         const COARSER: [u32; 2] = [3, 2];
         let means = |plane: PyramidPlane<[f32; 4]>, levels: u32| Self {
             means: (0..levels).fold(plane, |plane, _| plane.reduced()),
@@ -36,10 +37,11 @@ impl BorderColors {
         })
     }
 
-    /// How much a color at a pixel of the canvas belongs to the border around it: Tukey's biweight of its distance. A lamp that ends
-    /// at the border of a sky is no part of it, and is not carried on.
+    /// How much a color at a pixel of the canvas belongs to the border around it: Tukey's biweight of its distance. A
+    /// lamp that ends at the border of a sky is no part of it, and is not carried on.
     pub(super) fn belonging(&self, x: usize, y: usize, root: [f32; 3]) -> f32 {
-        /// Distance from which on a color is of another kind, square root of linear light: three times what clouds differ by.
+        /// Distance from which on a color is of another kind, square root of linear light: three times what clouds
+        /// differ by.
         const OTHER_KIND: f32 = 0.25;
         /// What it counts all the same, where the border has no kind.
         const LEAST: f32 = 0.002;

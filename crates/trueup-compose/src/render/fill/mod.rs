@@ -1,4 +1,5 @@
-//! Filling gaps: a smooth surface over the colors along their borders, and beside what is no such surface what the panorama shows elsewhere.
+//! Filling gaps: a smooth surface over the colors along their borders, and beside what is no such surface what the
+//! panorama shows elsewhere.
 
 mod border_colors;
 mod completion;
@@ -50,16 +51,16 @@ impl Shade for SumPixel {
 }
 
 impl Panorama {
-    /// Fills the gaps with a smooth surface that has the grain of what lies beside it, or where that differs more from place to place, with what
-    /// the panorama shows elsewhere; returns how many pixels that were. `gaps` are those of the layout it was made of. The same pixels
-    /// come out however the panorama is held.
+    /// Fills the gaps with a smooth surface that has the grain of what lies beside it, or where that differs more from
+    /// place to place, with what the panorama shows elsewhere; returns how many pixels that were. `gaps` are those of
+    /// the layout it was made of. The same pixels come out however the panorama is held.
     ///
     /// # Errors
     /// [`trueup_core::Error::Io`] if a scratch file cannot be read or written; [`trueup_core::Error::Cancelled`].
     ///
     /// # Source
-    /// The surface by push-pull: Gortler, Grzeszczuk, Szeliski, Cohen, "The lumigraph", SIGGRAPH 1996, section 3.4. What is shown elsewhere by
-    /// few offsets: He, Sun, "Statistics of patch offsets for image completion", ECCV 2012.
+    /// The surface by push-pull: Gortler, Grzeszczuk, Szeliski, Cohen, "The lumigraph", SIGGRAPH 1996, section 3.4.
+    /// What is shown elsewhere by few offsets: He, Sun, "Statistics of patch offsets for image completion", ECCV 2012.
     ///
     /// # Departures
     /// Only what lies beside a gap is carried into it, and what is of another kind than the border around it is not.
@@ -239,8 +240,8 @@ impl<'a> Canvas<'a> {
         (SHARE * self.gaps.radius()).clamp(WIDTHS[0], WIDTHS[1]).round() as usize
     }
 
-    /// Whether some gap lies in the square of [`Canvas::border`] pixels to every side of each pixel of a window, row by row; none
-    /// where it does nowhere.
+    /// Whether some gap lies in the square of [`Canvas::border`] pixels to every side of each pixel of a window, row by
+    /// row; none where it does nowhere.
     fn beside_gaps(&self, columns: &Range<usize>, rows: &Range<usize>) -> Option<Vec<bool>> {
         let border = self.border();
         let wide = widened(columns, border, self.width + 2 * self.lead);
@@ -414,8 +415,8 @@ fn spread(stretches: impl Iterator<Item = Range<usize>>, reach: usize, columns: 
 /// Levels, from pixels on, at which all that lies beside a gap is carried into it.
 const HAIRLINE_LEVELS: usize = 2;
 
-/// A sample counts as wholly known if this share of its surroundings is, its inverse: colors reach into a gap as far as the
-/// finest level that knows any, so that each place of a gap takes up what is next to it.
+/// A sample counts as wholly known if this share of its surroundings is, its inverse: colors reach into a gap as far as
+/// the finest level that knows any, so that each place of a gap takes up what is next to it.
 const SATURATION: f32 = 16.0;
 
 /// The finest of `levels` with what it lacks from the coarser ones, the coarsest from `coarser`.

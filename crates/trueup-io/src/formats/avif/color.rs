@@ -37,8 +37,8 @@ pub(super) enum Matrix {
 }
 
 impl Matrix {
-    /// By its code point (ITU-T H.273, table 4); `None` if it is none that photographs are in. Where it is unspecified, that of
-    /// JPEG is meant, as other readers of AVIF take it.
+    /// By its code point (ITU-T H.273, table 4); `None` if it is none that photographs are in. Where it is unspecified,
+    /// that of JPEG is meant, as other readers of AVIF take it.
     pub(super) fn of_code_point(code: u16) -> Option<Self> {
         Some(match code {
             0 => Self::Identity,
@@ -207,7 +207,8 @@ fn differences(planes: &Planes, plane: usize, y: usize, reading: Reading) -> Vec
         .collect()
 }
 
-/// The two of `count` samples, each for so many pixels, that lie beside a pixel, and how far it is from the first to the second.
+/// The two of `count` samples, each for so many pixels, that lie beside a pixel, and how far it is from the first to
+/// the second.
 fn between(pixel: usize, shared_by: usize, count: usize, is_on_first: bool) -> (usize, usize, f32) {
     if shared_by == 1 {
         return (pixel, pixel, 0.0);
@@ -230,7 +231,8 @@ mod tests {
 
     const EVERY: Option<Sampling> = Some(Sampling { x: 1, y: 1 });
 
-    /// Primary colors of Rec. ITU-R BT.709 and BT.601 by 8 bits of the limited range, as their tables of color bars have them.
+    /// Primary colors of Rec. ITU-R BT.709 and BT.601 by 8 bits of the limited range, as their tables of color bars
+    /// have them.
     #[test]
     fn color_bars_are_the_primaries() {
         let bars = |code, samples: [&[u16]; 3]| -> Vec<u8> {

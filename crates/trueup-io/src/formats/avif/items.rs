@@ -3,7 +3,8 @@
 //! Nothing is copied here; what is made of a file is in proportion to its bytes.
 //!
 //! # Source
-//! ISO/IEC 14496-12, sections 8.11.3 (iloc), 8.11.4 (pitm), 8.11.6 (iinf), 8.11.11 (idat), 8.11.12 (iref) and 8.11.14 (iprp).
+//! ISO/IEC 14496-12, sections 8.11.3 (iloc), 8.11.4 (pitm), 8.11.6 (iinf), 8.11.11 (idat), 8.11.12 (iref) and 8.11.14
+//! (iprp).
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -80,7 +81,8 @@ impl<'a> Items<'a> {
         self.kinds.get(&item).copied()
     }
 
-    /// The properties of an item in their order, each with its kind and whether the item cannot be shown without heeding it.
+    /// The properties of an item in their order, each with its kind and whether the item cannot be shown without
+    /// heeding it.
     pub(super) fn properties(&self, item: u64) -> impl Iterator<Item = ([u8; 4], &'a [u8], bool)> {
         let numbers = self.associations.get(&item).map(Vec::as_slice).unwrap_or_default();
         numbers.iter().filter_map(|&(number, is_essential)| {
@@ -224,7 +226,8 @@ mod tests {
         [&(content.len() as u32 + 8).to_be_bytes()[..], kind, content].concat()
     }
 
-    /// A file whose item 7 has these pieces, each of an offset and a length, counted from the file or from the items' own data.
+    /// A file whose item 7 has these pieces, each of an offset and a length, counted from the file or from the items'
+    /// own data.
     fn file(counted_from: u8, pieces: &[[u32; 2]]) -> Vec<u8> {
         let mut list = vec![1, 0, 0, 0, 0x44, 0, 0, 1, 0, 7, 0, counted_from, 0, 0];
         list.extend((pieces.len() as u16).to_be_bytes());

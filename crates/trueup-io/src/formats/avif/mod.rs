@@ -29,7 +29,8 @@ pub(crate) static AVIF: Format = Format {
     writing: None,
 };
 
-/// Whether a file that begins so is AVIF: by its own brand, or by one that stands for HEIF whatever the coding beside one of AVIF.
+/// Whether a file that begins so is AVIF: by its own brand, or by one that stands for HEIF whatever the coding beside
+/// one of AVIF.
 ///
 /// # Source
 /// AV1 Image File Format, section 6 (brands `avif`, `avis`); ISO/IEC 23008-12, annex B.4.

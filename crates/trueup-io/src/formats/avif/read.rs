@@ -1,6 +1,7 @@
 //! Photographs in AVIF.
 //!
-//! What would be allocated is judged first, by the sizes that the file states; the decoder refuses pictures that are larger than that.
+//! What would be allocated is judged first, by the sizes that the file states; the decoder refuses pictures that are
+//! larger than that.
 
 use exif::{Field, Tag};
 use trueup_core::raster::{Photograph, Raster};
@@ -22,16 +23,17 @@ use crate::metadata::exif_fields::ExifFields;
 /// What memory is asked for.
 const READING: &str = "reading an AVIF file";
 
-/// Bytes a pixel takes in memory while it is decoded, for [`MOST_CODED`] coded ones: three planes of 16 bits in the decoder and out of
-/// it, one of alpha; what is handed out, and turned, comes when the decoder is done.
+/// Bytes a pixel takes in memory while it is decoded, for [`MOST_CODED`] coded ones: three planes of 16 bits in the
+/// decoder and out of it, one of alpha; what is handed out, and turned, comes when the decoder is done.
 pub(super) const PIXEL_BYTES: usize = (2 * 3 + 1) * size_of::<u16>() * MOST_CODED;
 
-/// Most coded pixels for one that is shown, beside a tile of them: a crop can be as small as it likes, and what is decoded for it as
-/// large.
+/// Most coded pixels for one that is shown, beside a tile of them: a crop can be as small as it likes, and what is
+/// decoded for it as large.
 const MOST_CODED: usize = 2;
 const TILE_PIXELS: usize = 1 << 20;
 
-/// Properties that are heeded, or that change nothing of the pixels: shape of pixels, depth, what a screen should be capable of.
+/// Properties that are heeded, or that change nothing of the pixels: shape of pixels, depth, what a screen should be
+/// capable of.
 const HEEDED: [&[u8; 4]; 14] = [
     b"av1C", b"ispe", b"colr", b"irot", b"imir", b"clap", b"auxC", b"a1op", b"lsel", b"a1lx", b"pixi", b"pasp",
     b"clli", b"mdcv",
@@ -263,7 +265,8 @@ fn of_numbers(content: &[u8]) -> Option<CodePoints> {
 /// Left, top, width and height of what is shown of a picture.
 ///
 /// # Source
-/// ISO/IEC 14496-12, section 12.1.4.2: width and height, and how far the middle lies from that of the whole, as fractions.
+/// ISO/IEC 14496-12, section 12.1.4.2: width and height, and how far the middle lies from that of the whole, as
+/// fractions.
 fn crop(items: &Items<'_>, coded: &Coded) -> std::result::Result<[usize; 4], Refusal> {
     let Some(content) = items.property(items.primary, b"clap") else { return Ok([0, 0, coded.width, coded.height]) };
     let mut fields = Fields(content);
@@ -288,8 +291,8 @@ fn crop(items: &Items<'_>, coded: &Coded) -> std::result::Result<[usize; 4], Ref
 /// How a picture is to be turned, and then mirrored, as an orientation of EXIF.
 ///
 /// # Source
-/// ISO/IEC 23008-12, sections 6.5.10 (irot: quarter turns anticlockwise) and 6.5.12 (imir: 0 exchanges top and bottom, 1 left and
-/// right); EXIF 3.0, section 4.6.5.1.
+/// ISO/IEC 23008-12, sections 6.5.10 (irot: quarter turns anticlockwise) and 6.5.12 (imir: 0 exchanges top and bottom,
+/// 1 left and right); EXIF 3.0, section 4.6.5.1.
 fn orientation(items: &Items<'_>) -> u8 {
     let first = |kind| items.property(items.primary, kind).and_then(|content| content.first()).copied();
     let turns = usize::from(first(b"irot").unwrap_or(0) & 3);
@@ -333,7 +336,8 @@ pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
     icc.or_else(|| code_points.and_then(|points| profile_of_code_points(points.primaries, points.transfer)))
 }
 
-/// The pixels are turned upright as the file itself says, which outranks the orientation of EXIF; so do the numbers of its colors.
+/// The pixels are turned upright as the file itself says, which outranks the orientation of EXIF; so do the numbers of
+/// its colors.
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
     let bytes = contents(input, READING).ok()?;
     let described = described(&bytes).ok()?;

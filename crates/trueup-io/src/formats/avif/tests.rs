@@ -1,7 +1,7 @@
 //! Files that avifenc 0.11 made of [`level`].
 //!
-//! What avifdec of the same version made of those with loss lies beside them, as PNG. `turned.avif` has properties that turn and
-//! mirror it, and an orientation in EXIF that says something else.
+//! What avifdec of the same version made of those with loss lies beside them, as PNG. `turned.avif` has properties that
+//! turn and mirror it, and an orientation in EXIF that says something else.
 
 use trueup_core::StageContext;
 
@@ -81,7 +81,8 @@ fn tiles_are_put_together() {
 fn what_the_file_says_of_orientation_counts() {
     let (_folder, source, decoded) = read(file!("turned.avif"));
     assert_eq!((source.width, source.height, source.orientation), (HEIGHT, WIDTH, 1));
-    // A quarter turn anticlockwise, then top and bottom exchanged: rows and columns are, as in what heif-convert 1.15 makes of it.
+    // A quarter turn anticlockwise, then top and bottom exchanged: rows and columns are, as in what heif-convert 1.15
+    // makes of it.
     let found = difference(&decoded, |x, y, c| f64::from(level(y, x, c)));
     assert!(found <= 3.0, "{found}");
 }
@@ -169,7 +170,8 @@ fn what_cannot_be_shown_as_it_should_is_refused() {
 
 #[test]
 fn a_part_of_a_picture_is_cut_out_and_turned() {
-    // In place of the mirroring, which no other box depends on: 20 x 16 pixels, their middle 1 to the right of the whole's and 1 up.
+    // In place of the mirroring, which no other box depends on: 20 x 16 pixels, their middle 1 to the right of the
+    // whole's and 1 up.
     let whole = file!("turned.avif");
     let start = whole.windows(4).position(|kind| kind == b"imir").expect("mirroring") - 4;
     let fractions: Vec<u8> =

@@ -1,7 +1,8 @@
 //! From a camera's own colors to sRGB's.
 //!
 //! # Source
-//! DNG, chapter 6, "Mapping Camera Color Space to CIE XYZ Space"; chromatic adaptation after Bradford (ICC.1:2022, annex E).
+//! DNG, chapter 6, "Mapping Camera Color Space to CIE XYZ Space"; chromatic adaptation after Bradford (ICC.1:2022,
+//! annex E).
 
 /// Rows of a matrix.
 pub(super) type Matrix = [[f64; 3]; 3];
@@ -12,7 +13,8 @@ const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 const D50: [f64; 3] = [0.9642, 1.0, 0.8249];
 const D50_XY: [f64; 2] = [0.345_704, 0.358_540];
 
-/// From XYZ of D50 to linear sRGB: the inverse of the columns that ICC profiles of sRGB have (IEC 61966-2-1, adapted after Bradford).
+/// From XYZ of D50 to linear sRGB: the inverse of the columns that ICC profiles of sRGB have (IEC 61966-2-1, adapted
+/// after Bradford).
 const SRGB_FROM_XYZ: Matrix = [
     [3.133_856_1, -1.616_866_7, -0.490_614_6],
     [-0.978_768_4, 1.916_141_5, 0.033_454_0],
@@ -237,7 +239,8 @@ mod tests {
             assert!(balance.iter().all(|gain| (gain - 1.0).abs() < 2e-3), "{balance:?}");
             check_near(srgb_from_balanced, IDENTITY, 2e-3);
         }
-        // With a gain before its converter, and with a forward matrix: the columns of sRGB's profile (IEC 61966-2-1 to D50).
+        // With a gain before its converter, and with a forward matrix: the columns of sRGB's profile (IEC 61966-2-1 to
+        // D50).
         let forward = Some([[0.4361, 0.3851, 0.1431], [0.2225, 0.7169, 0.0606], [0.0139, 0.0971, 0.7141]]);
         let camera = UnderLight { xyz_from_balanced: forward, ..SRGB_CAMERA };
         for camera in [SRGB_CAMERA, camera] {

@@ -5,7 +5,8 @@
 
 /// Numbers of corrections (DNG, chapter 7).
 mod opcode {
-    /// Those that bend, mend single pixels or even out brightness about the middle: the picture can be used without them.
+    /// Those that bend, mend single pixels or even out brightness about the middle: the picture can be used without
+    /// them.
     pub(super) const DISPENSABLE: [u32; 6] = [1, 2, 3, 4, 5, 6];
     pub(super) const GAIN_MAP: u32 = 9;
 }
@@ -90,7 +91,8 @@ pub(super) struct GainMap {
     gains: Vec<f32>,
 }
 
-/// The gain maps of a list of corrections; `None` if it cannot be read, or has another correction that must not be left out.
+/// The gain maps of a list of corrections; `None` if it cannot be read, or has another correction that must not be left
+/// out.
 pub(super) fn gain_maps(list: &[u8]) -> Option<Vec<GainMap>> {
     let mut rest = list;
     let mut maps = Vec::new();

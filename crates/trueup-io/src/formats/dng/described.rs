@@ -1,7 +1,8 @@
 //! What a Digital Negative says of its picture.
 //!
 //! # Source
-//! DNG, chapters 2 to 4: the picture of the sensor is the directory, first or below it, that is no reduced copy and no preview.
+//! DNG, chapters 2 to 4: the picture of the sensor is the directory, first or below it, that is no reduced copy and no
+//! preview.
 
 use std::io::{Read, Seek};
 

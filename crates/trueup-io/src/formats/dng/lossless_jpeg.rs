@@ -1,7 +1,7 @@
 //! Lossless JPEG: differences from a prediction, in Huffman's code.
 //!
-//! Cameras and converters mostly write two components, the even and the odd columns of a mosaic, which libraries for photographs do not
-//! know.
+//! Cameras and converters mostly write two components, the even and the odd columns of a mosaic, which libraries for
+//! photographs do not know.
 //!
 //! # Source
 //! ITU-T T.81, annexes B (markers), C (tables), F.1.2.1 and F.2.2 (codes of differences), and H (lossless coding).
@@ -32,7 +32,8 @@ const CUT_OFF: &str = "its lossless JPEG is cut off or damaged";
 /// The `count` numbers of a lossless JPEG, row by row, components of a column beside each other.
 ///
 /// # Errors
-/// What is wrong; above all that it is of another kind, or not of so many numbers, which is found before they are decoded.
+/// What is wrong; above all that it is of another kind, or not of so many numbers, which is found before they are
+/// decoded.
 pub(super) fn decode(bytes: &[u8], count: usize) -> Result<Vec<u16>, String> {
     let mut header = Header::default();
     let mut rest = bytes.strip_prefix(&marker::START).ok_or("it is no JPEG")?;
@@ -295,8 +296,8 @@ mod tests {
     const WIDTH: usize = 12;
     const HEIGHT: usize = 10;
 
-    /// What libjpeg-turbo 3 (by imagecodecs) wrote of [`sample`]: each length in two bytes, then a JPEG: two components of 14 bits by each of
-    /// the seven predictors, one of 16 bits, three of 12.
+    /// What libjpeg-turbo 3 (by imagecodecs) wrote of [`sample`]: each length in two bytes, then a JPEG: two components
+    /// of 14 bits by each of the seven predictors, one of 16 bits, three of 12.
     fn files() -> Vec<&'static [u8]> {
         let mut rest = file!("lossless.jpegs");
         std::iter::from_fn(|| {
@@ -357,8 +358,8 @@ mod tests {
         }
     }
 
-    /// Two rows of two samples of 8 bits, a restart between them: a code of one bit for no difference (0), and one of two for a
-    /// difference of one bit (10). Each row begins at 128: 128 and 129, 127 and 127.
+    /// Two rows of two samples of 8 bits, a restart between them: a code of one bit for no difference (0), and one of
+    /// two for a difference of one bit (10). Each row begins at 128: 128 and 129, 127 and 127.
     #[test]
     fn predictions_begin_anew_behind_a_restart() {
         let file = |restart: u8| {

@@ -1,9 +1,9 @@
 //! From one color a pixel to three.
 //!
 //! # Source
-//! Green after Hamilton and Adams 1997, "Adaptive color plan interpolation in single sensor color electronic camera": along the
-//! direction in which colors change less, corrected by the other color's curvature. Red and blue by the mean of their differences from
-//! green around.
+//! Green after Hamilton and Adams 1997, "Adaptive color plan interpolation in single sensor color electronic camera":
+//! along the direction in which colors change less, corrected by the other color's curvature. Red and blue by the mean
+//! of their differences from green around.
 
 use rayon::prelude::*;
 

@@ -20,8 +20,8 @@ use crate::formats::linear_light::level;
 use crate::metadata::block;
 use crate::metadata::exif_fields::ExifFields;
 
-/// Bytes a pixel takes in memory while it is developed, of three colors: the sensor's numbers, their shares of white, greens, and what is
-/// handed out.
+/// Bytes a pixel takes in memory while it is developed, of three colors: the sensor's numbers, their shares of white,
+/// greens, and what is handed out.
 pub(super) const PIXEL_BYTES: usize = 3 * (size_of::<u16>() + size_of::<f32>() + size_of::<u16>()) + size_of::<f32>();
 
 /// Bits of what is developed.
@@ -35,7 +35,8 @@ pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, Hea
     Ok(StoredPixels { width, height, bits: BITS, is_float: false })
 }
 
-/// All fields. The sensor's numbers are read with them: of the directories that other libraries know, the first may be theirs.
+/// All fields. The sensor's numbers are read with them: of the directories that other libraries know, the first may be
+/// theirs.
 fn block(input: &mut Input) -> Option<exif::Exif> {
     let length = usize::try_from(input.get_ref().metadata().ok()?.len()).ok()?;
     check_room("reading a Digital Negative", length).ok()?;

@@ -1,5 +1,6 @@
-//! Files by hand, and two that other programs made of smooth colors seen by a camera whose own colors are far from sRGB's: PiDNG 4 wrote
-//! them, the lossless JPEG in one by imagecodecs. LibRaw (rawpy 0.28) develops them to within 0.2 and 0.8 levels of the same colors.
+//! Files by hand, and two that other programs made of smooth colors seen by a camera whose own colors are far from
+//! sRGB's: PiDNG 4 wrote them, the lossless JPEG in one by imagecodecs. LibRaw (rawpy 0.28) develops them to within 0.2
+//! and 0.8 levels of the same colors.
 
 use tempfile::TempDir;
 use trueup_core::StageContext;
@@ -38,7 +39,8 @@ fn negatives_of_other_programs_are_developed() {
     };
     let found = off(&decoded, |x, y| [x, y]);
     assert!(found <= 0.5, "{found}");
-    // 12 bits, packed; blue in the first row; to be turned clockwise, so that the first column is the last row's mirror.
+    // 12 bits, packed; blue in the first row; to be turned clockwise, so that the first column is the last row's
+    // mirror.
     let (_folder, source, decoded) = read(file!("packed.dng"));
     assert_eq!((source.width, source.height, source.orientation), (HEIGHT, WIDTH, 6));
     let found = off(&decoded, |x, y| [y, HEIGHT - 1 - x]);

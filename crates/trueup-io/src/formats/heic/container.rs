@@ -1,10 +1,11 @@
 //! Whether a file's boxes tell to copy more than the file holds.
 //!
-//! An item is put together from pieces of the file, a picture from items, and nothing in the format keeps them from being the same
-//! piece over and over: a file of some kilobytes could stand for any number of gigabytes.
+//! An item is put together from pieces of the file, a picture from items, and nothing in the format keeps them from
+//! being the same piece over and over: a file of some kilobytes could stand for any number of gigabytes.
 //!
 //! # Source
-//! ISO/IEC 14496-12, sections 8.11.3 (iloc), 8.11.12 (iref) and 8.11.14 (ipco); ISO/IEC 23008-12, section 6.6.2.3 (grids).
+//! ISO/IEC 14496-12, sections 8.11.3 (iloc), 8.11.12 (iref) and 8.11.14 (ipco); ISO/IEC 23008-12, section 6.6.2.3
+//! (grids).
 
 use std::collections::BTreeMap;
 
@@ -12,7 +13,8 @@ use heic_decoder::{HeifError, Result};
 
 use crate::formats::boxes::{Fields, children};
 
-/// Most bytes that the pieces of one picture may have together for one of the file. Writers share none, or a few flat tiles.
+/// Most bytes that the pieces of one picture may have together for one of the file. Writers share none, or a few flat
+/// tiles.
 const MOST_COPIES: u64 = 4;
 
 /// What is added to that: parameters of many small tiles.
@@ -75,7 +77,8 @@ impl PlaceLayout {
         fields.number(2)?;
         fields.number(self.base_bytes)?;
         let pieces = fields.number(2)?;
-        // Pieces without fields of their own would be all the same, and cost the file nothing: there can be any number of them.
+        // Pieces without fields of their own would be all the same, and cost the file nothing: there can be any number
+        // of them.
         if pieces > 1 && self.offset_bytes + self.length_bytes == 0 {
             return Some(Item { number, length: u64::MAX });
         }
@@ -141,7 +144,8 @@ mod tests {
         [&(content.len() as u32 + 8).to_be_bytes()[..], kind, content].concat()
     }
 
-    /// A file of 1000 bytes of pixels, one item with as many pieces of all of them, and a grid that has this as so many tiles.
+    /// A file of 1000 bytes of pixels, one item with as many pieces of all of them, and a grid that has this as so many
+    /// tiles.
     fn file(pieces: u16, tiles: u16) -> Vec<u8> {
         let mut places = vec![0, 0, 0, 0, 0x44, 0, 0, 1, 0, 7, 0, 0];
         places.extend(pieces.to_be_bytes());

@@ -1,6 +1,7 @@
 //! Photographs in HEIC.
 //!
-//! What the decoder would allocate is judged first: it has limits of its own, but they are those of the largest machine.
+//! What the decoder would allocate is judged first: it has limits of its own, but they are those of the largest
+//! machine.
 
 use exif::{Field, Tag};
 use heic_decoder::bitreader::strip_emulation_prevention;
@@ -28,8 +29,8 @@ const READING: &str = "reading a HEIC file";
 /// [`MOST_CODED`] coded ones. The samples handed out come when the tiles are gone.
 pub(super) const PIXEL_BYTES: usize = 2 * 3 * size_of::<i32>() * MOST_CODED;
 
-/// Most coded pixels for one that is shown, beside a tile of them: a crop can be as small as it likes, and what is decoded for it as
-/// large.
+/// Most coded pixels for one that is shown, beside a tile of them: a crop can be as small as it likes, and what is
+/// decoded for it as large.
 const MOST_CODED: usize = 2;
 const TILE_PIXELS: usize = 1 << 20;
 
@@ -95,8 +96,8 @@ pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
     })
 }
 
-/// The pixels are turned upright as the file itself says, which outranks the orientation of EXIF (ISO/IEC 23008-12, section 6.5.10
-/// and annex A.2.3). So do the numbers of its colors.
+/// The pixels are turned upright as the file itself says, which outranks the orientation of EXIF (ISO/IEC 23008-12,
+/// section 6.5.10 and annex A.2.3). So do the numbers of its colors.
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
     let Metadata { exif, color_info, .. } = metadata(input)?;
     let fields = ExifFields::from_exif(&block::parsed(exif?)?).turned_already();

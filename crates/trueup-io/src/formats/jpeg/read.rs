@@ -22,7 +22,8 @@ use crate::metadata::pose::stated_pose;
 /// Largest width and height a JPEG can state (ITU-T T.81 table B.2).
 const JPEG_MAX_SIDE: usize = 65_535;
 
-/// Headers as cameras and editors write them: some leave bytes between segments that are no markers, which harms no pixel.
+/// Headers as cameras and editors write them: some leave bytes between segments that are no markers, which harms no
+/// pixel.
 fn header_options() -> DecoderOptions {
     DecoderOptions::default().set_strict_mode(false).set_max_width(JPEG_MAX_SIDE).set_max_height(JPEG_MAX_SIDE)
 }
@@ -106,8 +107,8 @@ const BEYOND: [u8; 66] = {
 
 /// Decodes `coded` as if `behind` followed.
 ///
-/// Where bytes were lost or replaced, codes after them are most often decodable as others, and what tells is that data are left over or
-/// missing in the end.
+/// Where bytes were lost or replaced, codes after them are most often decodable as others, and what tells is that data
+/// are left over or missing in the end.
 ///
 /// # Departures
 /// Strict decoding of zune-jpeg 0.5.15 accepts both.
@@ -149,10 +150,11 @@ fn words(error: &DecodeErrors) -> String {
     }
 }
 
-/// A JPEG that lacks nothing but its end-of-image marker, as programs leave it that are stopped while they write; `None` if pixels are missing.
+/// A JPEG that lacks nothing but its end-of-image marker, as programs leave it that are stopped while they write;
+/// `None` if pixels are missing.
 ///
-/// Whatever follows the last coded block of a picture changes none of its pixels; where blocks are missing, it stands for them. Of progressive
-/// pictures it cannot be told in this way whether a scan that refines all pixels is missing.
+/// Whatever follows the last coded block of a picture changes none of its pixels; where blocks are missing, it stands
+/// for them. Of progressive pictures it cannot be told in this way whether a scan that refines all pixels is missing.
 ///
 /// # Source
 /// ITU-T T.81 F.2.2 (decoding of a block takes the bits that its codes tell, and no more).

@@ -13,12 +13,12 @@ use crate::formats::decoded::{check_unchanged, damaged, decoding_limit};
 /// Decodes the pixels as they are stored, of at least `least` columns and rows.
 ///
 /// # Source
-/// Of each block of 8 x 8 samples, only the 1, 4 or 16 lowest frequencies are transformed back: the discrete cosine transform of that size,
-/// which is nearly the mean of the samples under a pixel.
+/// Of each block of 8 x 8 samples, only the 1, 4 or 16 lowest frequencies are transformed back: the discrete cosine
+/// transform of that size, which is nearly the mean of the samples under a pixel.
 ///
 /// # Departures
-/// zune-jpeg, which reads whole photographs, has no such transforms. What jpeg-decoder does not make colors of (CMYK, 12 bits), zune-jpeg
-/// decodes whole.
+/// zune-jpeg, which reads whole photographs, has no such transforms. What jpeg-decoder does not make colors of (CMYK,
+/// 12 bits), zune-jpeg decodes whole.
 pub(super) fn pixels(source: &SourceImage, mut input: Input, least: [usize; 2]) -> Result<Photograph> {
     let mut bytes = Vec::new();
     input.read_to_end(&mut bytes).map_err(|error| Error::io("reading", &source.path, error))?;

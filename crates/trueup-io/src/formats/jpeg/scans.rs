@@ -5,8 +5,8 @@ const START_OF_FRAME_EXTENDED: u8 = 0xc1;
 const START_OF_SCAN: u8 = 0xda;
 const END_OF_IMAGE: u8 = 0xd9;
 
-/// The segments of a JPEG up to its first scan header, which is the last: each marker, and what follows its length as far as the file goes.
-/// Bytes between segments that are no markers are passed over, as decoders do.
+/// The segments of a JPEG up to its first scan header, which is the last: each marker, and what follows its length as
+/// far as the file goes. Bytes between segments that are no markers are passed over, as decoders do.
 ///
 /// # Source
 /// ITU-T T.81 B.1.1 (markers and segments).
@@ -31,9 +31,9 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
     })
 }
 
-/// Where the end-of-image marker is that follows the first scan header; `None` without one. The thumbnail's own marker lies before that, in EXIF;
-/// within a scan every 0xff of the data is followed by 0 or by a restart marker; and further pictures or maker data may
-/// follow the end.
+/// Where the end-of-image marker is that follows the first scan header; `None` without one. The thumbnail's own marker
+/// lies before that, in EXIF; within a scan every 0xff of the data is followed by 0 or by a restart marker; and further
+/// pictures or maker data may follow the end.
 ///
 /// # Source
 /// ITU-T T.81 B.1.1.2 to B.1.1.5.

@@ -1,4 +1,5 @@
-//! The coded bytes of a JPEG, watched while they are decoded: decoders say nothing of data that are left over or that ended too soon.
+//! The coded bytes of a JPEG, watched while they are decoded: decoders say nothing of data that are left over or that
+//! ended too soon.
 
 use std::cell::Cell;
 
@@ -7,7 +8,8 @@ use zune_core::bytestream::{ZByteIoError, ZByteReaderTrait, ZSeekFrom};
 /// Most bytes that a decoder holds ahead of what it decodes, with as many to spare: zune-jpeg holds up to 64 bits.
 const AHEAD_BYTES: usize = 16;
 
-/// Bytes that may be passed over before a marker without a meaning: decoders look for markers byte by byte, and read as much of some headers.
+/// Bytes that may be passed over before a marker without a meaning: decoders look for markers byte by byte, and read as
+/// much of some headers.
 const PASSED_BYTES: usize = 32;
 
 /// What was seen of the reading.

@@ -136,8 +136,9 @@ mod tests {
         assert_eq!(codestream(b"").expect("nothing"), b"");
     }
 
-    /// The stream of brotli (RFC 7932, section 9) that holds these bytes uncompressed: a window of 16 bits (0), a metablock
-    /// that is not the last (0), four nibbles of length (00), the length less one, uncompressed (1); then an empty last one (11).
+    /// The stream of brotli (RFC 7932, section 9) that holds these bytes uncompressed: a window of 16 bits (0), a
+    /// metablock that is not the last (0), four nibbles of length (00), the length less one, uncompressed (1); then an
+    /// empty last one (11).
     fn brotli(bytes: &[u8]) -> Vec<u8> {
         let head = ((bytes.len() as u32 - 1) << 4) | (1 << 20);
         [&head.to_le_bytes()[..3], bytes, &[3]].concat()

@@ -22,8 +22,8 @@ use crate::formats::linear_light::encoded;
 use crate::metadata::block;
 use crate::metadata::exif_fields::ExifFields;
 
-/// Bytes a pixel takes in memory while it is decoded: four channels of 32 bits, the same again while they are filtered, and half as
-/// much of coefficients and of what is handed out.
+/// Bytes a pixel takes in memory while it is decoded: four channels of 32 bits, the same again while they are filtered,
+/// and half as much of coefficients and of what is handed out.
 pub(super) const PIXEL_BYTES: usize = 48;
 
 /// Bytes that are read at a time.

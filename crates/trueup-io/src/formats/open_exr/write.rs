@@ -1,8 +1,9 @@
 //! Panoramas in OpenEXR: 32-bit floating point samples in blocks of rows, compressed by ZIP.
 //!
 //! # Source
-//! "OpenEXR File Layout" and "Technical Introduction to OpenEXR" (Academy Software Foundation): header, table of offsets, blocks of scan
-//! lines; the channels of a row one after the other, in the order of their names; colors multiplied by alpha.
+//! "OpenEXR File Layout" and "Technical Introduction to OpenEXR" (Academy Software Foundation): header, table of
+//! offsets, blocks of scan lines; the channels of a row one after the other, in the order of their names; colors
+//! multiplied by alpha.
 
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 

@@ -21,8 +21,8 @@ const SOFTWARE_KEY: &str = "SOFTWARE=";
 /// The declaration.
 ///
 /// # Source
-/// G. Ward, Real Pixels (Graphics Gems II, 1991), and "Radiance File Formats" (filefmts, Lawrence Berkeley National Laboratory). Sides: the
-/// resolution is text; rows beyond 32,767 pixels are not compressed.
+/// G. Ward, Real Pixels (Graphics Gems II, 1991), and "Radiance File Formats" (filefmts, Lawrence Berkeley National
+/// Laboratory). Sides: the resolution is text; rows beyond 32,767 pixels are not compressed.
 pub(crate) static RADIANCE: Format = Format {
     name: "Radiance",
     extensions: &["hdr"],

@@ -1,8 +1,8 @@
 //! A pixel of three mantissas and one exponent, and rows of them.
 //!
 //! # Source
-//! G. Ward, Real Pixels (Graphics Gems II, 1991): a mantissa m with exponent e stands for (m + 0.5) / 256 * 2^(e - 128), an exponent of
-//! 0 for black. Rows: "Radiance File Formats", adaptive run-length encoding.
+//! G. Ward, Real Pixels (Graphics Gems II, 1991): a mantissa m with exponent e stands for (m + 0.5) / 256 * 2^(e -
+//! 128), an exponent of 0 for black. Rows: "Radiance File Formats", adaptive run-length encoding.
 
 use std::io::{self, Read};
 
@@ -119,8 +119,8 @@ fn read_piece(input: &mut impl Read, left: &mut [[u8; BYTES]], channel: usize) -
     Ok(count)
 }
 
-/// Reads a row whose pixels follow each other; one of mantissas of 1 repeats the pixel before it as often as its exponent says, and
-/// more of them in a row by ever higher bytes.
+/// Reads a row whose pixels follow each other; one of mantissas of 1 repeats the pixel before it as often as its
+/// exponent says, and more of them in a row by ever higher bytes.
 fn read_old_row(input: &mut impl Read, width: usize, first: [u8; BYTES], row: &mut Vec<[u8; BYTES]>) -> io::Result<()> {
     let mut next = first;
     let mut shift = 0;

@@ -107,8 +107,8 @@ pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
 /// Decodes the pixels as they are stored.
 ///
 /// # Departures
-/// EXPOSURE, by which pixels were multiplied to be looked at, stays with them: undone, the white of a photograph would not be 1.
-/// Primaries are taken for sRGB's, which programs write whatever the header says.
+/// EXPOSURE, by which pixels were multiplied to be looked at, stays with them: undone, the white of a photograph would
+/// not be 1. Primaries are taken for sRGB's, which programs write whatever the header says.
 pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
     let Header { width, height, .. } = header(&mut input).map_err(|error| damaged(source, error.words()))?;
     check_unchanged(source, width, height)?;

@@ -86,8 +86,8 @@ pub(super) fn write_strips(
     }
 }
 
-/// Writes a picture and its smaller copies in tiles as they become ready; returns where the tiles of each level are, row by
-/// row. Tiles in which nothing is, where there is alpha to say so, are stored once.
+/// Writes a picture and its smaller copies in tiles as they become ready; returns where the tiles of each level are,
+/// row by row. Tiles in which nothing is, where there is alpha to say so, are stored once.
 pub(super) fn write_tiles(
     sink: &mut dyn BlockSink,
     picture: &dyn RowSource,
@@ -195,8 +195,8 @@ fn tile<S: OutputSample>(
     coded(tiles.columns(columns), [tiling.side, tiling.side], form).map(Some)
 }
 
-/// Rows of RGBA as the bytes of a block of `width` x `height` pixels; what the rows do not fill is 0. Deflated, each pixel
-/// is the difference from the one to its left.
+/// Rows of RGBA as the bytes of a block of `width` x `height` pixels; what the rows do not fill is 0. Deflated, each
+/// pixel is the difference from the one to its left.
 ///
 /// # Source
 /// TIFF 6.0 sections 14 (horizontal differencing) and 15 (tiles); Adobe Photoshop TIFF Technical Notes (deflate: a zlib

@@ -58,8 +58,8 @@ pub(crate) struct PagePlace<'a> {
     pub(crate) whole: [u32; 2],
 }
 
-/// Pixels per inch that pages with a place state: the place is told in inches, as a fraction with this denominator, which
-/// gives back whole pixels.
+/// Pixels per inch that pages with a place state: the place is told in inches, as a fraction with this denominator,
+/// which gives back whole pixels.
 const PIXELS_PER_INCH: u32 = 72;
 
 /// Tags of TIFF 6.0 section 12 that the `tiff` crate has no names for.

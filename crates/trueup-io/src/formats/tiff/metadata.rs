@@ -67,7 +67,8 @@ fn directory<W: Write + Seek, K: TiffKind>(
     Ok(Some(directory.finish_with_offsets()?.pointer.0))
 }
 
-/// Adds the metadata's tags to the picture's directory, the profile unless the samples are linear light. Tags that describe the picture's storage are the writer's own.
+/// Adds the metadata's tags to the picture's directory, the profile unless the samples are linear light. Tags that
+/// describe the picture's storage are the writer's own.
 pub(super) fn write_tags<W: Write + Seek, K: TiffKind>(
     directory: &mut DirectoryEncoder<'_, W, K>,
     metadata: &Metadata,

@@ -57,7 +57,8 @@ impl FirstPage {
     /// Bytes of a pixel on its way into memory.
     pub(super) fn pixel_bytes(&self) -> usize {
         let beside = match self.kind {
-            // Numbers of 32 bits are made of the others, and samples of 16 bits of these; planes are put together in as much room.
+            // Numbers of 32 bits are made of the others, and samples of 16 bits of these; planes are put together in as
+            // much room.
             PixelKind::Float(samples) => samples * size_of::<f32>(),
             PixelKind::Cmyk => 3 * usize::from(self.bits / 8),
             _ => 0,

@@ -1,8 +1,8 @@
 //! Camera raw in the form of a TIFF: the first page is a small copy, or its samples are those of the sensor.
 //!
 //! # Source
-//! TIFF/EP (ISO 12234-2) 5.1.2, and Adobe Digital Negative 1.7, chapter 3, for samples of the sensor: their interpretations
-//! are none that TIFF 6.0 has.
+//! TIFF/EP (ISO 12234-2) 5.1.2, and Adobe Digital Negative 1.7, chapter 3, for samples of the sensor: their
+//! interpretations are none that TIFF 6.0 has.
 
 use std::io::{Read, Seek};
 
@@ -83,7 +83,8 @@ mod tests {
     const START: u32 = 8;
     const DIRECTORY_BYTES: usize = 128;
 
-    /// A TIFF of a first directory and those it points to, each with entries of a tag and a number (TIFF 6.0 section 2).
+    /// A TIFF of a first directory and those it points to, each with entries of a tag and a number (TIFF 6.0 section
+    /// 2).
     fn file(first: &[(u16, u32)], below: &[&[(u16, u32)]]) -> Decoder<Cursor<Vec<u8>>> {
         Decoder::new(bytes(first, below)).expect("a directory")
     }

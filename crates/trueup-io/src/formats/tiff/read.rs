@@ -34,7 +34,8 @@ pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, Hea
     Ok(StoredPixels { width, height, bits, is_float: matches!(kind, PixelKind::Float(_)) })
 }
 
-/// The profile; of floating point samples, which are light, one of its primaries with the curve that they are handed out in.
+/// The profile; of floating point samples, which are light, one of its primaries with the curve that they are handed
+/// out in.
 pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
     let mut decoder = decoder(input).ok()?;
     let profile = decoder.find_tag(Tag::IccProfile).ok().flatten()?.into_u8_vec().ok()?;

@@ -1,4 +1,5 @@
-//! Texts that cannot be, kept from the decoder: it would take memory for them, or print a line when they are too long for it.
+//! Texts that cannot be, kept from the decoder: it would take memory for them, or print a line when they are too long
+//! for it.
 //!
 //! # Source
 //! TIFF 6.0, section 2 ("readers should skip over fields containing an unexpected field type"), and BigTIFF.

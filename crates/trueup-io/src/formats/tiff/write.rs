@@ -23,8 +23,8 @@ pub(crate) use super::directory::PagePlace;
 /// directory need some room beyond the pixels.
 const BIG_TIFF_BYTES: u64 = 4_000_000_000;
 
-/// Pixels from which a picture is written in tiles, unless the options say: beyond what programs that hold whole pictures
-/// open without effort, viewers that read only what they show are what it is for.
+/// Pixels from which a picture is written in tiles, unless the options say: beyond what programs that hold whole
+/// pictures open without effort, viewers that read only what they show are what it is for.
 const TILED_FROM_PIXELS: usize = 1 << 26;
 
 /// The longest side of a TIFF: readers hold sizes in signed numbers of 32 bits.
@@ -120,8 +120,8 @@ impl PageForm {
         width.saturating_mul(height)
     }
 
-    /// Most pixels that take room of so many layers, which have `pixels` together, on a panorama of this size; `are_whole` says that their
-    /// pages are as large as that.
+    /// Most pixels that take room of so many layers, which have `pixels` together, on a panorama of this size;
+    /// `are_whole` says that their pages are as large as that.
     pub(crate) fn pixels_of_layers(&self, pixels: u64, count: usize, whole: [usize; 2], are_whole: bool) -> u64 {
         let count = count as u64;
         let all = self.pixels_in_blocks(whole).saturating_mul(count);
@@ -130,7 +130,8 @@ impl PageForm {
             _ if self.blocks.deflate => pixels,
             None if are_whole => all,
             None => pixels,
-            // Empty tiles are stored once, those that a layer reaches into whole: at two of its sides, or at four if it lies on the panorama.
+            // Empty tiles are stored once, those that a layer reaches into whole: at two of its sides, or at four if it
+            // lies on the panorama.
             Some(side) => {
                 let reach = side as u64 * if are_whole { 2 } else { 1 };
                 let sides = whole[0] as u64 + whole[1] as u64;

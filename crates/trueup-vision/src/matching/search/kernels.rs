@@ -133,7 +133,8 @@ fn portable(tile: &DistanceTile<'_>, row_best: &mut [LaneBest; ROWS], column_bes
     }
 }
 
-/// Puts the squared distances of `descriptor` from those of `all` whose numbers are `members` into `found`, in their order.
+/// Puts the squared distances of `descriptor` from those of `all` whose numbers are `members` into `found`, in their
+/// order.
 pub(crate) fn squared_distances(descriptor: &Descriptor, all: &[&Descriptor], members: &[u32], found: &mut Vec<u32>) {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {

@@ -4,8 +4,8 @@
 //!
 //! Squared distances are whole numbers, |a|^2 + |b|^2 - 2ab, at most 128 * 255^2 < 2^23. A distance and a 9-bit number
 //! therefore fit one 32-bit key, and the minimum of keys is the nearest neighbor with the smaller number winning ties.
-//! One pass over all products keeps, for every row (a descriptor of the first photograph), the two smallest keys of each
-//! of 16 interleaved lanes of columns, and for every column the smallest key over the rows.
+//! One pass over all products keeps, for every row (a descriptor of the first photograph), the two smallest keys of
+//! each of 16 interleaved lanes of columns, and for every column the smallest key over the rows.
 //!
 //! # Exactness
 //!

@@ -1,8 +1,9 @@
 //! Results of earlier runs, kept in a folder by what they were made from.
 //!
-//! An entry is a file whose name is the hash of everything that decides its content: the photographs' bytes, the options of
-//! the stages concerned, and the program's own stages. What is found is therefore what would be made again; nothing is ever
-//! out of date. Entries are written beside their place and renamed, so that several programs may share a folder.
+//! An entry is a file whose name is the hash of everything that decides its content: the photographs' bytes, the
+//! options of the stages concerned, and the program's own stages. What is found is therefore what would be made again;
+//! nothing is ever out of date. Entries are written beside their place and renamed, so that several programs may share
+//! a folder.
 
 mod entry;
 #[cfg(test)]
@@ -96,9 +97,9 @@ impl PhotographCache {
         Ok(Self { folder: folder.to_owned(), max_bytes, uses: Mutex::default(), trouble: Mutex::default() })
     }
 
-    /// How often results were found and made, by what they are: `measured` (a photograph), `stacks` (which of all are one), `pair`, `likeness`
-    /// (how all look like each other), `geometry` (a panorama), `parallax` (how far its photographs give way) and `light` (what evens
-    /// theirs out).
+    /// How often results were found and made, by what they are: `measured` (a photograph), `stacks` (which of all are
+    /// one), `pair`, `likeness` (how all look like each other), `geometry` (a panorama), `parallax` (how far its
+    /// photographs give way) and `light` (what evens theirs out).
     pub fn uses(&self) -> BTreeMap<&'static str, CacheUse> {
         self.uses.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }

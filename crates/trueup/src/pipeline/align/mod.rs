@@ -59,8 +59,8 @@ pub(crate) struct Geometry {
     pub mesh: WarpedMesh,
     /// The pairs whose overlaps are to coincide.
     pub coinciding: Vec<PairMatches>,
-    /// The photographs' segments as they were found again behind lenses that bend, in working pixels; `None` where those
-    /// measured stand.
+    /// The photographs' segments as they were found again behind lenses that bend, in working pixels; `None` where
+    /// those measured stand.
     pub straightened: Option<Vec<Vec<LineSegment>>>,
 }
 
@@ -71,8 +71,8 @@ impl Geometry {
     }
 }
 
-/// Finds the geometry of a group, unless an earlier run did, by `options` that are fixed by the method. Photographs are numbered
-/// within the group.
+/// Finds the geometry of a group, unless an earlier run did, by `options` that are fixed by the method. Photographs are
+/// numbered within the group.
 ///
 /// # Errors
 /// Those of the stages; [`trueup_core::Error::NotApplicable`] if a warp model cannot place the photographs;

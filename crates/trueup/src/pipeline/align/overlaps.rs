@@ -34,7 +34,8 @@ pub(super) struct Overlaps {
     pub warps: Vec<OverlapWarp>,
 }
 
-/// Estimates the cameras and carries grids across the overlaps, unless this was done before for the same group of the set.
+/// Estimates the cameras and carries grids across the overlaps, unless this was done before for the same group of the
+/// set.
 ///
 /// # Errors
 /// Those of the two stages.

@@ -26,13 +26,13 @@ pub(crate) fn needs_pixels(options: &AlignOptions) -> bool {
     options.stitch.align.uses_lines() || options.stitch.align.uses_pixels()
 }
 
-/// What draws overlaps together where it is left to the photographs, of whose matched points `misaligned_share` stay apart by
-/// what neighbors have in common.
+/// What draws overlaps together where it is left to the photographs, of whose matched points `misaligned_share` stay
+/// apart by what neighbors have in common.
 ///
 /// The note `parallax` says so where lines and pixels are taken.
 pub(super) fn asked_for(misaligned_share: f64, context: &StageContext) -> Evidence {
-    /// Photographs taken from one point come to less (65 of 66 sets with known cameras, 32 of 33 in which people walk). Of 60 photographed sets, the same 51
-    /// come to more by what stayed as came to 0.015 by all.
+    /// Photographs taken from one point come to less (65 of 66 sets with known cameras, 32 of 33 in which people walk).
+    /// Of 60 photographed sets, the same 51 come to more by what stayed as came to 0.015 by all.
     const WORTH_REFINING: f64 = 0.012;
     if misaligned_share < WORTH_REFINING {
         return Evidence::Points;
@@ -58,8 +58,8 @@ pub(super) struct RefinementSources {
 }
 
 impl RefinementSources {
-    /// Pyramids and line matches from the pixels that were kept; photographs that were measured without keeping theirs are
-    /// decoded again.
+    /// Pyramids and line matches from the pixels that were kept; photographs that were measured without keeping theirs
+    /// are decoded again.
     ///
     /// # Errors
     /// Those of decoding; [`trueup_core::Error::Cancelled`].

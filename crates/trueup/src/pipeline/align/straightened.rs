@@ -1,8 +1,9 @@
 //! Segments behind lenses that bend: found again in pictures without their bend.
 //!
-//! A straight edge is a curve behind such a lens. What a detector of straight segments finds of it is cut short, and points
-//! aside where the curve shows more clearly on one side. Once the lens is known, the working picture is drawn as a pinhole
-//! would have seen it, and the segments of that one stand for the photograph's; their ends lie where the photograph has them.
+//! A straight edge is a curve behind such a lens. What a detector of straight segments finds of it is cut short, and
+//! points aside where the curve shows more clearly on one side. Once the lens is known, the working picture is drawn as
+//! a pinhole would have seen it, and the segments of that one stand for the photograph's; their ends lie where the
+//! photograph has them.
 
 use std::borrow::Cow;
 
@@ -22,11 +23,11 @@ use super::component::Component;
 use crate::pipeline::measure::THUMBNAIL_PIXELS;
 use crate::pipeline::outside::lines_outside;
 
-/// Largest tangent of the angle from the axis that is drawn, along each side: 56 degrees. What lies farther out is drawn so
-/// large that its edges are soft.
+/// Largest tangent of the angle from the axis that is drawn, along each side: 56 degrees. What lies farther out is
+/// drawn so large that its edges are soft.
 const FARTHEST: f64 = 1.5;
-/// Pixels between two places of which the lens is asked where it shows them; straight between them. Where a lens moves the
-/// corners of a photograph of 1000 pixels by 20 %, that is off by less than a hundredth of a pixel.
+/// Pixels between two places of which the lens is asked where it shows them; straight between them. Where a lens moves
+/// the corners of a photograph of 1000 pixels by 20 %, that is off by less than a hundredth of a pixel.
 const NODE_STEP: usize = 4;
 /// Points along each side of a photograph by which its extent is found.
 const BORDER_POINTS: usize = 33;
@@ -79,7 +80,8 @@ fn of_photograph(gray: &Raster<f32>, camera: &Camera, context: &StageContext) ->
     Ok(found.iter().filter_map(in_photograph).collect())
 }
 
-/// What a pinhole in the camera's place would show, `size` pixels across and down; not a number where that is beyond the photograph.
+/// What a pinhole in the camera's place would show, `size` pixels across and down; not a number where that is beyond
+/// the photograph.
 fn drawn(gray: &Raster<f32>, camera: &Camera, pinhole: &Camera, [width, height]: [usize; 2]) -> Raster<f32> {
     let nodes = |length: usize| length.div_ceil(NODE_STEP) + 1;
     let places: Vec<Vec<Vector2<f64>>> = (0..nodes(height))
@@ -131,8 +133,8 @@ fn sample(gray: &Raster<f32>, place: Vector2<f64>) -> f32 {
         return f32::NAN;
     }
     let (x, y) = (place.x - 0.5, place.y - 0.5);
-    // At least -1/2: one higher, the whole part is the next lower number. The casts are of numbers within the picture, and
-    // beyond it by two at most.
+    // At least -1/2: one higher, the whole part is the next lower number. The casts are of numbers within the picture,
+    // and beyond it by two at most.
     let below = |position: f64| (position + 1.0) as i64 - 1;
     let (column, line) = (below(x), below(y));
     let (taps_x, taps_y) =
@@ -161,8 +163,8 @@ mod tests {
 
     use super::*;
 
-    /// A bright half plane behind a barrel lens: its edge is a curve in the photograph, and one straight segment again, whose
-    /// ends and middle span the plane of the edge to a tenth of a pixel.
+    /// A bright half plane behind a barrel lens: its edge is a curve in the photograph, and one straight segment again,
+    /// whose ends and middle span the plane of the edge to a tenth of a pixel.
     #[test]
     fn a_bent_edge_is_one_straight_segment() {
         let lens = Lens::new(LensTerms {

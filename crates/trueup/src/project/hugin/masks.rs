@@ -11,11 +11,12 @@ const AT_BORDER_PX: f64 = 0.5;
 /// Least area of a mask, in pixels: what is smaller is rounding.
 const LEAST_AREA_PX: f64 = 1.0;
 
-/// The lines of the masks that exclude what lies beside the outline of photograph `number` of the project; none without an outline.
+/// The lines of the masks that exclude what lies beside the outline of photograph `number` of the project; none without
+/// an outline.
 ///
 /// # Source
-/// Hugin's project files: `k`, the photograph (`i`), the type (`t0` excludes), and the corners of a polygon (`p`) in pixels of the stored
-/// picture from its left upper corner.
+/// Hugin's project files: `k`, the photograph (`i`), the type (`t0` excludes), and the corners of a polygon (`p`) in
+/// pixels of the stored picture from its left upper corner.
 pub(super) fn lines(number: usize, image: &ImageRecord) -> String {
     let Some(outline) = &image.outline else { return String::new() };
     let upright = image.inset.outer([image.width, image.height]).map(|length| length as f64);
@@ -32,7 +33,8 @@ pub(super) fn lines(number: usize, image: &ImageRecord) -> String {
     lines
 }
 
-/// Where a place of the upright picture, of `size` pixels, lies in the stored one, whose EXIF orientation mirrors nothing.
+/// Where a place of the upright picture, of `size` pixels, lies in the stored one, whose EXIF orientation mirrors
+/// nothing.
 fn stored_place([x, y]: [f64; 2], [width, height]: [f64; 2], orientation: u8) -> [f64; 2] {
     match orientation {
         6 => [y, width - x],
@@ -67,8 +69,9 @@ fn onto(side: Side, [x, y]: [f64; 2], [width, height]: [f64; 2]) -> [f64; 2] {
     }
 }
 
-/// Simple polygons that together are what of a picture of `size` pixels lies beside a simple polygon, one for each corner of the picture where
-/// there is any: they are parted by the ways straight to the border from the polygon's outermost corners at the four sides, which cross nothing.
+/// Simple polygons that together are what of a picture of `size` pixels lies beside a simple polygon, one for each
+/// corner of the picture where there is any: they are parted by the ways straight to the border from the polygon's
+/// outermost corners at the four sides, which cross nothing.
 fn beside(mut corners: Vec<[f64; 2]>, size: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
     let count = corners.len();
     if count == 0 {
@@ -130,7 +133,8 @@ mod tests {
         }
     }
 
-    /// A print that was turned clockwise: a triangle at each corner of the picture, and what lies between it and the border.
+    /// A print that was turned clockwise: a triangle at each corner of the picture, and what lies between it and the
+    /// border.
     #[test]
     fn a_turned_photograph_has_a_mask_at_each_corner() {
         let turned = [[20.0, 5.0], [95.0, 15.0], [80.0, 75.0], [10.0, 60.0]];
@@ -144,8 +148,8 @@ mod tests {
         assert_eq!(lines(2, &ImageRecord { outline: None, ..outlined(1, Inset::default(), &turned) }), "");
     }
 
-    /// Of a photograph that reaches the picture's border at the left and right, with bent sides at the top and bottom, a mask ends where it
-    /// meets the border; of one that is its whole picture, nothing is masked.
+    /// Of a photograph that reaches the picture's border at the left and right, with bent sides at the top and bottom,
+    /// a mask ends where it meets the border; of one that is its whole picture, nothing is masked.
     #[test]
     fn where_a_photograph_reaches_the_border_nothing_is_masked() {
         let bent = [[0.0, 0.0], [50.0, 10.0], [100.0, 0.0], [100.0, 80.0], [50.0, 70.0], [0.0, 80.0]];
@@ -156,8 +160,8 @@ mod tests {
         assert_eq!(lines(0, &outlined(1, Inset::default(), &whole)), "");
     }
 
-    /// Every pixel of the stored picture lies in a mask, or inside the outline, and none in two: those of outlines with a dent, beyond the
-    /// picture, inside a frame, and in pictures that are turned.
+    /// Every pixel of the stored picture lies in a mask, or inside the outline, and none in two: those of outlines with
+    /// a dent, beyond the picture, inside a frame, and in pictures that are turned.
     #[test]
     fn each_pixel_is_masked_once_or_shown() {
         let inset = Inset { left: 3, top: 5, right: 7, bottom: 9 };

@@ -1,8 +1,9 @@
-//! The cameras of a panorama as a project of the Hugin stitcher, written and read (`read`, by the lines of `parse`; drawn in `panorama`).
+//! The cameras of a panorama as a project of the Hugin stitcher, written and read (`read`, by the lines of `parse`;
+//! drawn in `panorama`).
 //!
 //! # Source
-//! The format: Hugin's own description of its project files (`doc/nona.txt` of panotools and the manual's page on `.pto`).
-//! Angles: yaw to the right, pitch upwards, roll clockwise, applied in the order roll, pitch, yaw.
+//! The format: Hugin's own description of its project files (`doc/nona.txt` of panotools and the manual's page on
+//! `.pto`). Angles: yaw to the right, pitch upwards, roll clockwise, applied in the order roll, pitch, yaw.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt::Write;
@@ -35,8 +36,8 @@ struct Attitude {
 }
 
 impl Attitude {
-    /// Of a camera with this rotation from the levelled world (y down) to the camera. Straight up or down, where yaw and
-    /// roll are one, all of it is yaw.
+    /// Of a camera with this rotation from the levelled world (y down) to the camera. Straight up or down, where yaw
+    /// and roll are one, all of it is yaw.
     fn of(camera_from_level: &Matrix3<f64>) -> Self {
         let level_from_camera = camera_from_level.transpose();
         let forward = level_from_camera.column(2);
@@ -53,13 +54,14 @@ impl Attitude {
 /// A panorama's cameras, exposures and vignetting as a Hugin project, whose panorama is the whole sphere in
 /// equirectangular projection at the pixel scale of the photographs' middles.
 ///
-/// Images are named by the paths in the record and described as they are stored in their files: Hugin's renderer knows no
-/// EXIF orientation, which goes into the roll. What lies beside an outline is masked. What the mesh does beyond the cameras has no place in the format, nor have
-/// the matches, which the record does not hold: `cpfind` of Hugin finds such again.
+/// Images are named by the paths in the record and described as they are stored in their files: Hugin's renderer knows
+/// no EXIF orientation, which goes into the roll. What lies beside an outline is masked. What the mesh does beyond the
+/// cameras has no place in the format, nor have the matches, which the record does not hold: `cpfind` of Hugin finds
+/// such again.
 ///
 /// # Errors
-/// [`Error::Input`] where the record has no cameras, they show a flat scene from many places, a photograph's orientation mirrors it, or its path
-/// holds what ends a name there.
+/// [`Error::Input`] where the record has no cameras, they show a flat scene from many places, a photograph's
+/// orientation mirrors it, or its path holds what ends a name there.
 pub fn hugin_project(project: &Project) -> Result<String> {
     let missing =
         || Error::input("Hugin project", "the panorama has no cameras", "Stitch at least two overlapping photographs.");
@@ -141,7 +143,8 @@ fn image_line(image: &ImageRecord, camera_from_level: &Matrix3<f64>, focal_px: f
     let correction = image.correction.unwrap_or_else(|| Correction::uniform(image.gain.unwrap_or(1.0)));
     let [red, green, blue] = correction.gain;
     let [vb, vc, vd] = vignetting(&correction);
-    // Hugin divides by the white balance, ours are factors; exposure values count stops by which a photograph is brightened.
+    // Hugin divides by the white balance, ours are factors; exposure values count stops by which a photograph is
+    // brightened.
     Ok(format!(
         "i w{width} h{height} f{format} v{:.6} r{:.6} p{:.6} y{:.6} TrX0 TrY0 TrZ0 a{a} b{b} c{c} d{d} e{e} g0 t0 Eev{:.6} Er{:.6} \
          Eb{:.6} Ra0 Rb0 Rc0 Rd0 Re0 Va1 Vb{vb:.6} Vc{vc:.6} Vd{vd:.6} Vx0 Vy0 Vm5{crop} n\"{}\"",
@@ -164,8 +167,8 @@ struct StoredPicture {
     turn: f64,
 }
 
-/// A lens in Hugin's terms: a pixel at the radius a r^4 + b r^3 + c r^2 + (1 - a - b - c) r, in units of half the shorter
-/// side, where the projection alone has r, from a center moved by d and e pixels.
+/// A lens in Hugin's terms: a pixel at the radius a r^4 + b r^3 + c r^2 + (1 - a - b - c) r, in units of half the
+/// shorter side, where the projection alone has r, from a center moved by d and e pixels.
 struct HuginLens {
     /// 0 rectilinear, 3 fisheye.
     format: u8,
@@ -183,8 +186,9 @@ impl HuginLens {
         Self { format: 0, field_of_view, radial: [0.0; 3], center_px: [0.0; 2] }
     }
 
-    /// The polynomial nearest to the lens over the photograph, by least squares on radii; tangential terms have no place in
-    /// the format. The coefficient of r is made what Hugin wants of it by the unit of r, which the focal length takes up.
+    /// The polynomial nearest to the lens over the photograph, by least squares on radii; tangential terms have no
+    /// place in the format. The coefficient of r is made what Hugin wants of it by the unit of r, which the focal
+    /// length takes up.
     fn of(lens: &PlacedLens, focal_px: f64, stored: &StoredPicture) -> Self {
         const SAMPLES: usize = 128;
         const STEPS: usize = 20;

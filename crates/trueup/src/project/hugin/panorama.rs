@@ -22,21 +22,21 @@ use crate::project::fill::{empty, record_appearance, record_canvas};
 use crate::project::read::find_file;
 use crate::project::record::{ImageRecord, ImageStatus, Project};
 
-/// Cells of a grid along a photograph's longer side: between its vertices, the picture is carried along bilinearly, to a
-/// tenth of a pixel.
+/// Cells of a grid along a photograph's longer side: between its vertices, the picture is carried along bilinearly, to
+/// a tenth of a pixel.
 const CELLS: f64 = 64.0;
 /// Sizes of the panorama, against the photographs' own pixels, that are taken over.
 const SCALES: std::ops::RangeInclusive<f64> = 1e-3..=16.0;
 
 impl HuginProject {
-    /// The panorama that it describes, of its photographs, which lie as it names them in `folder` or here, ready to be composed: the
-    /// cameras draw it, since the format knows of nothing else, and light is evened out anew.
+    /// The panorama that it describes, of its photographs, which lie as it names them in `folder` or here, ready to be
+    /// composed: the cameras draw it, since the format knows of nothing else, and light is evened out anew.
     ///
     /// Projection and pixel scale are the project's, as far as they are drawn here; what is shown is chosen anew.
     ///
     /// # Errors
-    /// [`Error::Input`] if a photograph is missing, cannot be read, has another size or a mirroring EXIF orientation; those of the
-    /// layout; [`Error::Cancelled`].
+    /// [`Error::Input`] if a photograph is missing, cannot be read, has another size or a mirroring EXIF orientation;
+    /// those of the layout; [`Error::Cancelled`].
     pub fn project(&self, folder: &Path, context: &StageContext) -> Result<Project> {
         let mut options = StitchOptions::default();
         options.arrange.projection.kind = self.projection.unwrap_or(Projection::Auto);

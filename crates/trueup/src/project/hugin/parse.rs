@@ -157,7 +157,8 @@ impl<'a> Line<'a> {
     }
 }
 
-/// The field of what was read as a name of letters alone, where it ends as programs print what is no number or no finite one: `rnan`.
+/// The field of what was read as a name of letters alone, where it ends as programs print what is no number or no
+/// finite one: `rnan`.
 fn field_of_no_number(letters: &str) -> Option<&str> {
     let ends = ["nan", "infinity", "inf"].into_iter();
     let field = |end: &str| {

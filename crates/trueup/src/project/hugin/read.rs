@@ -58,8 +58,8 @@ impl HuginProject {
     /// Reads the text of `file`.
     ///
     /// # Errors
-    /// [`Error::Input`] that names file and photograph if it is no Hugin project, is damaged, or holds what is not read: lenses other
-    /// than rectilinear and fisheye, cameras that moved (mosaic mode), shear.
+    /// [`Error::Input`] that names file and photograph if it is no Hugin project, is damaged, or holds what is not
+    /// read: lenses other than rectilinear and fisheye, cameras that moved (mosaic mode), shear.
     pub fn parse(text: &str, file: &str) -> Result<Self> {
         let HuginLines { panorama, images, masked } = HuginLines::parse(text, file)?;
         let images: Vec<HuginImage> =
@@ -194,8 +194,8 @@ impl Polynomial {
         alone_px * (1.0 - a - b - c + r * (c + r * (b + r * a)))
     }
 
-    /// Our terms nearest to it over the photograph, by least squares, and by what the focal length grows with them; `None` if
-    /// it bends light back, or our terms come nowhere near.
+    /// Our terms nearest to it over the photograph, by least squares, and by what the focal length grows with them;
+    /// `None` if it bends light back, or our terms come nowhere near.
     fn as_terms(&self, projection: LensProjection, focal_px: f64) -> Option<(LensTerms, f64)> {
         if self.terms == [0.0; 3] {
             return Some((LensTerms { projection, ..LensTerms::default() }, 1.0));

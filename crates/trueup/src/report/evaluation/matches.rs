@@ -57,15 +57,17 @@ pub struct PairMatchEvaluation {
     pub median_px: f64,
 }
 
-/// Matches the photographs of a panorama anew, read from their files, wherever two may overlap, and measures how far apart what they show alike
-/// lies.
+/// Matches the photographs of a panorama anew, read from their files, wherever two may overlap, and measures how far
+/// apart what they show alike lies.
 ///
-/// Paths are tried as by [`crate::evaluate_pixels`]. Masks are not asked. The same matches are found for every panorama of the same photographs
-/// with the same options of measuring and matching, but for lenses that bend, which the project tells.
+/// Paths are tried as by [`crate::evaluate_pixels`]. Masks are not asked. The same matches are found for every panorama
+/// of the same photographs with the same options of measuring and matching, but for lenses that bend, which the project
+/// tells.
 ///
 /// # Errors
-/// [`Error::Input`] if a photograph is not found, is not the one that was stitched, cannot be read, or if grids or focal lengths are damaged;
-/// [`Error::Unsolvable`] if no two photographs have matches; [`Error::Options`]; [`Error::Cancelled`].
+/// [`Error::Input`] if a photograph is not found, is not the one that was stitched, cannot be read, or if grids or
+/// focal lengths are damaged; [`Error::Unsolvable`] if no two photographs have matches; [`Error::Options`];
+/// [`Error::Cancelled`].
 pub fn evaluate_matches(project: &Project, project_folder: &Path, context: &StageContext) -> Result<MatchEvaluation> {
     project.options.validate()?;
     let records: Vec<&ImageRecord> = project.used_images().collect();
@@ -167,7 +169,8 @@ fn summed(by_pair: Vec<PairMatchEvaluation>) -> Option<MatchEvaluation> {
     Some(MatchEvaluation { pairs: by_pair.len(), matches, rms_px, median_px, by_pair })
 }
 
-/// The middle of the values, or the mean of the two beside it: of few pairs, [`trueup_core::statistics::median`] would tell the worse.
+/// The middle of the values, or the mean of the two beside it: of few pairs, [`trueup_core::statistics::median`] would
+/// tell the worse.
 fn middle(values: &mut [f64]) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let half = values.len() / 2;

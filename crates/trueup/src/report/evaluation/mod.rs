@@ -29,7 +29,8 @@ use crate::project::record::{ImageRecord, Project};
 pub use matches::{MatchEvaluation, PairMatchEvaluation, evaluate_matches};
 pub use pixels::{PixelEvaluation, compare_overlaps, evaluate_pixels, scale_up_to};
 
-/// The recorded photographs in the recorded light, to be read again from their files, of which the paths are tried as by [`evaluate_pixels`].
+/// The recorded photographs in the recorded light, to be read again from their files, of which the paths are tried as
+/// by [`evaluate_pixels`].
 ///
 /// # Errors
 /// Those of [`find_photograph`].
@@ -66,16 +67,16 @@ pub struct Evaluation {
     pub gdic_deg: f64,
     /// GDIC with the project's reference as its own; `None` if the truth does not name that photograph.
     pub gdic_reference_deg: Option<f64>,
-    /// GDIC with each photograph's best-fitting similarity instead of its smallest rectangle: without the floor that strong
-    /// perspective gives to GDIC.
+    /// GDIC with each photograph's best-fitting similarity instead of its smallest rectangle: without the floor that
+    /// strong perspective gives to GDIC.
     pub gdic_similarity_deg: f64,
-    /// Mean error of the prior's rotations, relative to the first photograph: its quality before the mesh. `None` if the
-    /// project holds no rotations.
+    /// Mean error of the prior's rotations, relative to the first photograph: its quality before the mesh. `None` if
+    /// the project holds no rotations.
     pub theta_error_deg: Option<f64>,
     /// The largest such error.
     pub theta_error_max_deg: Option<f64>,
-    /// The paper's local distortion LD (equations 12 and 13), times 100: the largest over the photographs. Judged are cells
-    /// whose center lies outside all other photographs.
+    /// The paper's local distortion LD (equations 12 and 13), times 100: the largest over the photographs. Judged are
+    /// cells whose center lies outside all other photographs.
     pub ld: f64,
     /// Mean over the photographs of the same.
     pub ld_mean: f64,
@@ -83,8 +84,8 @@ pub struct Evaluation {
     pub ld_corners: f64,
     /// Cells that are folded, in all photographs. LD leaves them out; figures with different counts do not compare.
     pub folds: usize,
-    /// Root mean square distance in the panorama of the two places of what two photographs both show, in the photographs' own
-    /// pixels; `None` if no photographs overlap or they were taken from different places.
+    /// Root mean square distance in the panorama of the two places of what two photographs both show, in the
+    /// photographs' own pixels; `None` if no photographs overlap or they were taken from different places.
     pub align_px: Option<f64>,
     /// What the panorama's measures state without the truth, beside it; `None` if the project holds no measures.
     pub stated: Option<StatedEvaluation>,
@@ -117,7 +118,8 @@ pub struct PhotographEvaluation {
     pub upright_deg: Option<f64>,
     /// By how much the prior's rotation is wrong, relative to the first photograph.
     pub theta_error_deg: Option<f64>,
-    /// By how much the vertical that the measures state its lean by is wrong, as drawn in its middle; `None` if they state none.
+    /// By how much the vertical that the measures state its lean by is wrong, as drawn in its middle; `None` if they
+    /// state none.
     pub lean_error_deg: Option<f64>,
 }
 
@@ -156,9 +158,9 @@ pub fn read_truth(path: &Path) -> Result<Truth> {
 /// ```
 ///
 /// # Errors
-/// [`Error::Input`] if the truth does not fit: it names none of the project's photographs, fewer than two of those used, or
-/// one of another size, or two of the project's photographs have one name; if the truth is impossible; if the project's grids
-/// are damaged.
+/// [`Error::Input`] if the truth does not fit: it names none of the project's photographs, fewer than two of those
+/// used, or one of another size, or two of the project's photographs have one name; if the truth is impossible; if the
+/// project's grids are damaged.
 pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     truth.check(&subject(truth))?;
     let known = match_photographs(project, truth)?;
@@ -217,7 +219,8 @@ struct StatedLean {
 }
 
 impl StatedLean {
-    /// Leans are stated where vertical lines are, the truth's is in the photograph's middle: there the two verticals are compared, which lean alike elsewhere.
+    /// Leans are stated where vertical lines are, the truth's is in the photograph's middle: there the two verticals
+    /// are compared, which lean alike elsewhere.
     fn of(project: &Project, known: &Known, mesh: &GridMesh, true_lean: f64) -> Option<Self> {
         let photographs = &project.measures.as_ref()?.photographs;
         let one = photographs.iter().find(|one| one.path == known.record.path)?;

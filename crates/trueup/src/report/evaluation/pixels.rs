@@ -74,8 +74,8 @@ pub fn scale_up_to(project: &Project, wanted: f64) -> Result<f64> {
     Ok(wanted.min(layers_scale(&whole_grids(project, &records)?)))
 }
 
-/// Compares the used photographs of a project, which are at `positions` of `photographs`, where they overlap, at a scale
-/// relative to the panorama's size.
+/// Compares the used photographs of a project, which are at `positions` of `photographs`, where they overlap, at a
+/// scale relative to the panorama's size.
 ///
 /// # Errors
 /// As [`evaluate_pixels`].

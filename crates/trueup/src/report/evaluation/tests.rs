@@ -83,8 +83,8 @@ fn an_evaluation_without_a_middle_is_read_as_it_was_written() {
     assert_eq!(read.photographs, evaluation.photographs);
 }
 
-/// The first photograph's vertical is stated 0.3 degrees off, and that it leans by 7 where its lines are: compared are the verticals in its middle. The
-/// second states none.
+/// The first photograph's vertical is stated 0.3 degrees off, and that it leans by 7 where its lines are: compared are
+/// the verticals in its middle. The second states none.
 #[test]
 fn stated_verticals_are_compared_in_the_middle() {
     let mut stitched = project([3.0, -1.0]);

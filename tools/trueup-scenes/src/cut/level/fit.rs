@@ -111,7 +111,8 @@ impl System {
         system
     }
 
-    /// The sandwich estimator with one cluster a column of views: its lines share the errors of the panorama's stitching.
+    /// The sandwich estimator with one cluster a column of views: its lines share the errors of the panorama's
+    /// stitching.
     ///
     /// # Source
     /// Liang and Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986; small-sample

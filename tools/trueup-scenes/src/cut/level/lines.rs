@@ -25,15 +25,15 @@ pub(super) struct UprightLine {
     pub normal: Vector3<f64>,
     /// Weight: the line's length, capped.
     pub weight: f64,
-    /// The column of views it was found in: columns alternate between the halves, and lines of a column share the errors
-    /// of the panorama's stitching.
+    /// The column of views it was found in: columns alternate between the halves, and lines of a column share the
+    /// errors of the panorama's stitching.
     pub column: usize,
 }
 
 /// Lines whose planes come within reach of the panorama's own down, view after view.
 ///
-/// Views overlap, so that no line is cut where two views meet, but every place counts once, in the view it is closest to
-/// the middle of: the halves look at different parts of the scene.
+/// Views overlap, so that no line is cut where two views meet, but every place counts once, in the view it is closest
+/// to the middle of: the halves look at different parts of the scene.
 pub(super) fn upright_lines(
     panorama: &Panorama360,
     options: &LevelOptions,

@@ -24,13 +24,13 @@ trueup_core::options! {
         search_step_deg: f64 = 0.5, between(0.05, 5.0), "degrees";
         /// Largest angle between the vertical and a line's plane for the line to count as vertical.
         tolerance_deg: f64 = 3.0, between(0.05, 15.0), "degrees";
-        /// Scale of the robust (Geman-McClure) loss of the refinement. Stitched panoramas bend their verticals by half a
-        /// degree; with a smaller scale the loss settles on the lines of a few places and the halves agree less.
+        /// Scale of the robust (Geman-McClure) loss of the refinement. Stitched panoramas bend their verticals by half
+        /// a degree; with a smaller scale the loss settles on the lines of a few places and the halves agree less.
         refine_scale_deg: f64 = 1.0, between(0.01, 10.0), "degrees";
         /// Fewer vertical lines in either half are no measurement.
         min_lines: usize = 20, between(3.0, 1e6), "lines";
-        /// Largest angle between the verticals of the two halves. They look at different parts of the scene, so that the
-        /// vertical of all views errs by about half of it.
+        /// Largest angle between the verticals of the two halves. They look at different parts of the scene, so that
+        /// the vertical of all views errs by about half of it.
         max_halves_deg: f64 = 0.5, between(0.001, 90.0), "degrees";
         /// Largest standard error.
         max_standard_error_deg: f64 = 0.25, between(0.001, 90.0), "degrees";

@@ -3,20 +3,21 @@
 use super::labelling::{Energy, Shown};
 use super::part::beside;
 
-/// Most of a difference of pictures that is corrected, root of light, as the light of a sky differs from place to place: of what differs by more, something ends
-/// there.
+/// Most of a difference of pictures that is corrected, root of light, as the light of a sky differs from place to
+/// place: of what differs by more, something ends there.
 const MOST: f32 = 0.1;
 
-/// Rounds of successive overrelaxation, and how far beyond the mean of its neighbors each sample is moved: what is left of a difference after these is a
-/// hundredth over some thirty samples.
+/// Rounds of successive overrelaxation, and how far beyond the mean of its neighbors each sample is moved: what is left
+/// of a difference after these is a hundredth over some thirty samples.
 const ROUNDS: usize = 60;
 const OVERRELAXATION: f32 = 1.8;
 
-/// For each sample of a gap what is added to what is shown there, roots of light: steps at seams and borders turned into slopes that are as even as can be.
+/// For each sample of a gap what is added to what is shown there, roots of light: steps at seams and borders turned
+/// into slopes that are as even as can be.
 ///
 /// # Source
-/// Pérez, Gangnet, Blake, "Poisson image editing", SIGGRAPH 2003, equation 7, for what is added instead of for the sum; between two samples of different
-/// sources the gradient is the mean of both.
+/// Pérez, Gangnet, Blake, "Poisson image editing", SIGGRAPH 2003, equation 7, for what is added instead of for the sum;
+/// between two samples of different sources the gradient is the mean of both.
 pub(super) fn of(energy: &Energy<'_>, shown: &[Shown]) -> Vec<[f32; 3]> {
     let part = energy.part;
     let width = part.width();
@@ -64,7 +65,8 @@ mod tests {
     use super::super::part::Part;
     use super::*;
 
-    /// One row of twelve samples: a gap of four between two of its border, and what lies six samples farther, all of one gray.
+    /// One row of twelve samples: a gap of four between two of its border, and what lies six samples farther, all of
+    /// one gray.
     fn row(border: [f32; 2], elsewhere: f32) -> Part {
         let gray = |level: f32| Some([level; 3]);
         let colors = (0..12).map(|at| match at {
@@ -95,7 +97,8 @@ mod tests {
         assert_eq!([shown(0.0), shown(0.2)], [vec![0; 4], vec![1; 4]]);
     }
 
-    /// What lies elsewhere is by 0.05 darker than one end of the border and by as much brighter than the other: what is added falls evenly.
+    /// What lies elsewhere is by 0.05 darker than one end of the border and by as much brighter than the other: what is
+    /// added falls evenly.
     #[test]
     fn a_step_at_the_border_becomes_a_slope() {
         let part = row([0.35, 0.25], 0.3);

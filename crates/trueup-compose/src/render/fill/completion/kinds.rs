@@ -9,10 +9,12 @@ use crate::window::near;
 /// Most that a sample differs from one of the border that is of its kind, root of light.
 const SAME_COLOR: f32 = 0.08;
 
-/// The same of the deviation of its pixels, as a multiple and beyond it: a tree is as dark as the sky between clouds, but not as even.
+/// The same of the deviation of its pixels, as a multiple and beyond it: a tree is as dark as the sky between clouds,
+/// but not as even.
 const SAME_DEVIATION: f32 = 1.5;
 
-/// The same of the mean deviation around that of the border, as a multiple of its own: a pavement is as gray as a tree's shade, but evener.
+/// The same of the mean deviation around that of the border, as a multiple of its own: a pavement is as gray as a
+/// tree's shade, but evener.
 const SAME_TEXTURE: f32 = 2.0;
 
 /// Deviations that are alike whatever their proportion: noise.
@@ -43,7 +45,8 @@ impl Kind {
     }
 }
 
-/// Which samples of a part are, with those around them, of the kind of the gap's border; `is_whole` tells which are known and wholly covered.
+/// Which samples of a part are, with those around them, of the kind of the gap's border; `is_whole` tells which are
+/// known and wholly covered.
 pub(super) fn usable(part: &Part, samples: &Samples, is_whole: &[bool]) -> Vec<bool> {
     let (width, height) = (part.width(), part.rows.len());
     let deviations: Vec<f32> = samples.within(&part.columns, &part.rows).map(|at| samples.deviations[at]).collect();

@@ -7,10 +7,12 @@ use crate::max_flow::{DOWN, GridFlow, RIGHT};
 /// Costs are whole numbers of such steps of roots of light.
 const STEPS: f32 = 4096.0;
 
-/// Cost of what may not be shown: more than a sample, its border and its four seams cost together, so that no cut is cheaper with it.
+/// Cost of what may not be shown: more than a sample, its border and its four seams cost together, so that no cut is
+/// cheaper with it.
 const FORBIDDEN: i32 = 1 << 22;
 
-/// How much more a step at the border costs than one within the gap: of photographs beside what lies elsewhere, more is seen.
+/// How much more a step at the border costs than one within the gap: of photographs beside what lies elsewhere, more is
+/// seen.
 const BORDER_WEIGHT: f32 = 2.0;
 
 /// Rounds of expansions, at most.
@@ -32,8 +34,8 @@ pub(super) struct Energy<'a> {
 /// Chooses for each sample of a gap what is shown there.
 ///
 /// # Source
-/// The cost of a seam between two offsets is that of Kwatra, Schödl, Essa, Turk, Bobick, "Graphcut textures", SIGGRAPH 2003, equation 1,
-/// with the offsets as labels of Pritch, Kav-Venaki, Peleg, "Shift-map image editing", ICCV 2009.
+/// The cost of a seam between two offsets is that of Kwatra, Schödl, Essa, Turk, Bobick, "Graphcut textures", SIGGRAPH
+/// 2003, equation 1, with the offsets as labels of Pritch, Kav-Venaki, Peleg, "Shift-map image editing", ICCV 2009.
 ///
 /// # Departures
 /// The smooth surface is one of the labels.
@@ -91,10 +93,12 @@ impl<'a> Energy<'a> {
         ((steps[0] + steps[1]) * STEPS) as i32 + 1
     }
 
-    /// Lets `label` be shown where that lowers the cost most; returns whether it is anywhere it was not. `place` is one more than the place of a sample in the gap.
+    /// Lets `label` be shown where that lowers the cost most; returns whether it is anywhere it was not. `place` is one
+    /// more than the place of a sample in the gap.
     ///
     /// # Source
-    /// Boykov, Veksler, Zabih, "Fast approximate energy minimization via graph cuts", IEEE TPAMI 23(11), 2001, section 5.
+    /// Boykov, Veksler, Zabih, "Fast approximate energy minimization via graph cuts", IEEE TPAMI 23(11), 2001,
+    /// section 5.
     fn expand(&self, flow: &mut GridFlow, place: &[u32], shown: &mut [Shown], label: Shown) -> bool {
         flow.reset(shown.len());
         for (index, &now) in shown.iter().enumerate() {

@@ -1,7 +1,8 @@
 //! What the panorama shows elsewhere in gaps beside clouds, lawns and the like, which no smooth surface goes on as.
 //!
-//! [`samples`] is the panorama around gaps, reduced; [`part`] one gap; [`roughness`] how rough its border is, and [`kinds`] what around it is of the
-//! kind of that; [`offsets`] by which this goes on along the border; [`labelling`] which of them each place is filled from; [`correction`] what is added there, so that nothing ends in a step.
+//! [`samples`] is the panorama around gaps, reduced; [`part`] one gap; [`roughness`] how rough its border is, and
+//! [`kinds`] what around it is of the kind of that; [`offsets`] by which this goes on along the border; [`labelling`]
+//! which of them each place is filled from; [`correction`] what is added there, so that nothing ends in a step.
 
 mod correction;
 mod elsewhere;
@@ -31,7 +32,8 @@ pub(super) struct Completion {
     /// Log2 of the pixels per sample.
     level: u32,
     columns: usize,
-    /// What is shown at every sample of the canvas: 0 the smooth surface, or one more than an index to `offsets`. Empty if nothing else is anywhere.
+    /// What is shown at every sample of the canvas: 0 the smooth surface, or one more than an index to `offsets`. Empty
+    /// if nothing else is anywhere.
     shown: Vec<Shown>,
     /// Where it lies from there, pixels.
     offsets: Vec<[isize; 2]>,
@@ -123,7 +125,8 @@ impl Completion {
         [(at, (1.0 - u) * (1.0 - v)), (at + 1, u * (1.0 - v)), (below, (1.0 - u) * v), (below + 1, u * v)]
     }
 
-    /// How much of what lies elsewhere is shown at a pixel: none at the border, all from a sample or so on, so that nothing ends at a line.
+    /// How much of what lies elsewhere is shown at a pixel: none at the border, all from a sample or so on, so that
+    /// nothing ends at a line.
     fn share_at(&self, pixel: [usize; 2]) -> f32 {
         let known: f32 = self.around(pixel).map(|(at, weight)| weight * self.known[at]).iter().sum();
         // Half of what lies around a border is known.

@@ -34,7 +34,8 @@ struct Stretch {
 /// He, Sun, "Statistics of patch offsets for image completion", ECCV 2012: a gap is filled from few offsets.
 ///
 /// # Departures
-/// These are those that fit the border, each a stretch of it, rather than those at which patches repeat most often: of clouds, none do.
+/// These are those that fit the border, each a stretch of it, rather than those at which patches repeat most often: of
+/// clouds, none do.
 pub(super) fn of(part: &Part) -> Vec<[isize; 2]> {
     let [width, height] = [part.width(), part.rows.len().min(part.reach_down)];
     let tried = |step: usize| (2 * width / step + 1) * (2 * height / step + 1);

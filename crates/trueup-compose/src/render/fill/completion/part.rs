@@ -35,8 +35,8 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// The gaps that are one each, but for small ones, those whose border a smooth surface goes on, and those that go across the ends of a full turn, whose
-    /// columns are `once`.
+    /// The gaps that are one each, but for small ones, those whose border a smooth surface goes on, and those that go
+    /// across the ends of a full turn, whose columns are `once`.
     pub(super) fn all(samples: &Samples, once: &Range<usize>, around: bool) -> Vec<Self> {
         let mut is_open = samples.open.clone();
         let mut gaps = Vec::new();

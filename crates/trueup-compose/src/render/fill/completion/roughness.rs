@@ -14,8 +14,9 @@ const ASKED: usize = 64;
 /// Share of them that differs by less than what counts.
 const RANK: f32 = 0.67;
 
-/// How much the border beside each sample of a gap differs from sample to sample, beyond what noise does: of the nearest stretch of the border, what
-/// a third of it exceeds. So one lamp in an even sky is nothing, and clouds are something.
+/// How much the border beside each sample of a gap differs from sample to sample, beyond what noise does: of the
+/// nearest stretch of the border, what a third of it exceeds. So one lamp in an even sky is nothing, and clouds are
+/// something.
 pub(super) fn of(part: &Part) -> Vec<f32> {
     let is_border = part.is_border();
     let step = |at: usize| {

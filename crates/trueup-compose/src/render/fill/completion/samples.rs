@@ -21,8 +21,8 @@ const LEAST_REACH: usize = 16;
 /// Rows of samples that are read at once; a number of threads must not show in the panorama.
 const ROWS_AT_ONCE: usize = 32;
 
-/// Samples beside a gap, and above and below it, among which what fills it is looked for, by its `depth`: the samples from its border to its middle. What lies
-/// at another height is another thing.
+/// Samples beside a gap, and above and below it, among which what fills it is looked for, by its `depth`: the samples
+/// from its border to its middle. What lies at another height is another thing.
 pub(super) fn reach(depth: f64) -> [usize; 2] {
     [((REACH * depth) as usize).max(LEAST_REACH), depth as usize + LEAST_REACH]
 }
@@ -46,7 +46,8 @@ pub(super) struct Samples {
     pub(super) shares: Vec<f32>,
     /// Deviations of the pixels of a sample from their mean, square roots of light.
     pub(super) deviations: Vec<f32>,
-    /// Whether a gap takes part in the pixels that lie nearer to this sample than to those beside it, or between it and these.
+    /// Whether a gap takes part in the pixels that lie nearer to this sample than to those beside it, or between it and
+    /// these.
     pub(super) open: Vec<bool>,
     /// Whether all of these pixels are covered.
     pub(super) whole: Vec<bool>,
