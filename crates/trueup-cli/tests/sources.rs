@@ -11,8 +11,8 @@ const MOST_COLUMNS: usize = 120;
 
 /// Adds the Rust files below a folder of the repository, but for what is built there.
 fn add_sources(folder: &Path, sources: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
+    for entry in fs::read_dir(folder).expect("a folder of the repository") {
+        let path = entry.expect("an entry of it").path();
         if path.is_dir() && path.file_name().is_some_and(|name| name != "target" && name != "node_modules") {
             add_sources(&path, sources);
         } else if path.extension().is_some_and(|extension| extension == "rs") {
@@ -30,7 +30,7 @@ fn files_are_short_and_comments_are_wrapped() {
     assert!(sources.len() > 100, "only {} source files were found", sources.len());
     let mut broken = Vec::new();
     for path in &sources {
-        let text = fs::read_to_string(path).unwrap();
+        let text = fs::read_to_string(path).expect("a source file");
         if text.lines().count() > MOST_LINES {
             broken.push(format!("{}: more than {MOST_LINES} lines", path.display()));
         }

@@ -51,6 +51,18 @@ impl Parameters {
     pub(super) fn has_lens(&self) -> bool {
         self.lenses.iter().any(|lens| !lens.is_pinhole())
     }
+
+    /// The same with focal lengths that are one common multiple of those `from` which they came, in the geometric mean
+    /// of the photographs of each label.
+    pub(super) fn with_common_focal(mut self, from: &[f64], labels: &[usize]) -> Self {
+        let factor = |k: usize| (self.focal_px[k] / from[k]).ln();
+        let mean_of = |label: usize| {
+            let members = || (0..labels.len()).filter(|&k| labels[k] == label);
+            (members().map(factor).sum::<f64>() / members().count() as f64).exp()
+        };
+        self.focal_px = from.iter().zip(labels).map(|(from, &label)| from * mean_of(label)).collect();
+        self
+    }
 }
 
 /// The sum of squares that is minimized over [`Parameters`].

@@ -180,6 +180,13 @@ impl IntrinsicsModel {
         Self { parameters_of: self.parameters_of.iter().map(renumbered).collect(), parameters: kept.len() }
     }
 
+    /// Whether photographs share a focal length.
+    pub(super) fn shares_focal(&self) -> bool {
+        let mut of: Vec<usize> = self.parameters_of.iter().filter_map(|of| of[FOCAL]).collect();
+        of.sort_unstable();
+        of.windows(2).any(|pair| pair[0] == pair[1])
+    }
+
     /// Whether anything but focal lengths is free.
     pub(super) fn has_lens(&self) -> bool {
         self.parameters_of.iter().any(|of| of[FOCAL + 1..].iter().any(Option::is_some))

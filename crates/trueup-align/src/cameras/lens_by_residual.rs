@@ -133,7 +133,8 @@ impl LensSearch<'_> {
         if CommonSquare::of_overlaps(&gaps(problem, shared)).sure() < LEAST_COMMON {
             return Ok(None);
         }
-        let lens_of = CameraPrior::lens_groups(problem.priors);
+        // A lens bends otherwise at another of its settings.
+        let lens_of = zoom::settings(shared, &CameraPrior::lens_groups(problem.priors));
         let is_asked = |prior: &CameraPrior| self.kind != LensKind::Pinhole && prior.lens.is_none();
         let asked: Vec<bool> = problem.priors.iter().map(is_asked).collect();
         let own = model.with_own_focal();

@@ -3,9 +3,7 @@
 use trueup_core::{Result, StageContext};
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
-use super::intrinsics::{
-    CENTER, FOCAL, FreeTerms, IntrinsicsModel, RADIAL, TANGENTIAL, ZOOM_SPREAD, only_focal, set_free,
-};
+use super::intrinsics::{CENTER, FOCAL, FreeTerms, IntrinsicsModel, RADIAL, TANGENTIAL, only_focal, set_free};
 use super::lens_evidence::{LensEvidence, Witness};
 use super::options::LensKind;
 use super::prior::CameraPrior;
@@ -318,25 +316,4 @@ struct Ask<'a> {
     of: &'a [bool],
     /// Limit of the loss.
     huber_px: f64,
-}
-
-/// The settings of zoomed lenses: photographs of a group whose focal lengths are alike, as a number for each.
-pub(super) fn settings(parameters: &Parameters, group_of: &[usize]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..group_of.len()).collect();
-    let focal_px = &parameters.focal_px;
-    order.sort_by(|&one, &two| group_of[one].cmp(&group_of[two]).then(focal_px[one].total_cmp(&focal_px[two])));
-    let mut settings = vec![0; group_of.len()];
-    let (mut setting, mut first) = (0, order.first().copied());
-    for pair in order.windows(2) {
-        let (before, next) = (pair[0], pair[1]);
-        let apart = |from: usize| (focal_px[next] / focal_px[from]).ln();
-        // Neither a step nor a slow drift is one setting.
-        let alike = apart(before) < ZOOM_SPREAD && first.is_some_and(|first| apart(first) < 2.0 * ZOOM_SPREAD);
-        if group_of[before] != group_of[next] || !alike {
-            setting += 1;
-            first = Some(next);
-        }
-        settings[next] = setting;
-    }
-    settings
 }

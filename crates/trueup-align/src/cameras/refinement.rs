@@ -6,7 +6,7 @@ use trueup_core::{Result, StageContext};
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, Parameters};
 use super::expected_focal::{self, ExpectedFocal, OpenFocal};
 use super::intrinsics::IntrinsicsModel;
-use super::lenses::{FoundLenses, LensSearch, settings};
+use super::lenses::{FoundLenses, LensSearch};
 use super::observations::Observations;
 use super::options::{CameraOptions, FocalSharing};
 use super::prior::CameraPrior;
@@ -118,8 +118,11 @@ pub(super) fn refine(
         return end.refined(Found { parameters, model, per_picture_focal: false });
     }
     if per_picture_focal && problem.is_sound(&fine) {
-        let settings = settings(&fine, &CameraPrior::lens_groups(priors));
-        if let Some(FoundLenses { parameters, model }) = search.find(&fine, &settings)? {
+        let settings = zoom::settings(&fine, &CameraPrior::lens_groups(priors));
+        // What shares a factor keeps its ratios, which each photograph found for itself here.
+        let together = fine.clone().with_common_focal(&problem.start_focal_px, &settings);
+        let together = problem.coarse_to_fine(together, &IntrinsicsModel::common(&settings), context)?;
+        if let Some(FoundLenses { parameters, model }) = search.find(&together, &settings)? {
             return end.refined(Found { parameters, model, per_picture_focal });
         }
     }
@@ -156,7 +159,7 @@ impl End<'_> {
         let problem = self.search.problem;
         let may_differ = self.options.focal_sharing == FocalSharing::Auto && parameters.focal_px.len() > 1;
         if may_differ
-            && !per_picture_focal
+            && model.shares_focal()
             && let Some(own) = self.search.refocused(&model, &parameters)?
         {
             (parameters, model) = own;

@@ -3,6 +3,7 @@
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, Parameters};
 use super::intrinsics::{FOCAL, IntrinsicsModel, ZOOM_SPREAD};
 use super::pair_cost::pair_cost;
+use super::prior::CameraPrior;
 
 /// Share of the squared errors under a common focal length that those with focal lengths of their own may leave where
 /// few photographs differ. Parallax bends focal lengths, too, but leaves more. Measured over all overlaps, of which
@@ -13,8 +14,8 @@ const MAX_SHARE_LEFT: f64 = 0.2;
 
 /// A zoom that was found.
 pub(super) struct Zoomed {
-    /// Which focal lengths are free: one for each photograph, or, where few differ, one for each of these and one for
-    /// the rest of a group.
+    /// Which focal lengths are free: one for each setting, where few differ of these alone, and one for the rest of a
+    /// group.
     pub model: IntrinsicsModel,
     /// From where to refine them.
     pub start: Parameters,
@@ -32,23 +33,43 @@ pub(super) fn found(
     shared: &Parameters,
     own: &Parameters,
 ) -> Option<Zoomed> {
-    if focal_ratios(model, shared, own).iter().any(|of_group| middle_half(of_group) > ZOOM_SPREAD) {
-        let model = IntrinsicsModel::per_photograph(problem.priors.len());
-        return Some(Zoomed { model, start: own.clone() });
-    }
-    if !fits_far_better(problem, model, shared, own) {
-        return None;
-    }
     let mut start = own.clone();
-    let mut labels = Vec::new();
-    for (photograph, differs) in differing(model, shared, own).into_iter().enumerate() {
-        let group = model.parameters_of[photograph][FOCAL].filter(|_| !differs);
-        if group.is_some() {
-            start.focal_px[photograph] = shared.focal_px[photograph];
+    let mut labels = settings(own, &CameraPrior::lens_groups(problem.priors));
+    if focal_ratios(model, shared, own).iter().all(|of_group| middle_half(of_group) <= ZOOM_SPREAD) {
+        if !fits_far_better(problem, model, shared, own) {
+            return None;
         }
-        labels.push(group.unwrap_or(model.parameters + photograph));
+        for (photograph, differs) in differing(model, shared, own).into_iter().enumerate() {
+            let group = model.parameters_of[photograph][FOCAL].filter(|_| !differs);
+            if group.is_some() {
+                start.focal_px[photograph] = shared.focal_px[photograph];
+            }
+            labels[photograph] = group.unwrap_or(model.parameters + labels[photograph]);
+        }
     }
+    let start = start.with_common_focal(&problem.start_focal_px, &labels);
     Some(Zoomed { model: IntrinsicsModel::common(&labels), start })
+}
+
+/// The settings of zoomed lenses: photographs of a group whose focal lengths are alike, as a number for each.
+pub(super) fn settings(parameters: &Parameters, group_of: &[usize]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..group_of.len()).collect();
+    let focal_px = &parameters.focal_px;
+    order.sort_by(|&one, &two| group_of[one].cmp(&group_of[two]).then(focal_px[one].total_cmp(&focal_px[two])));
+    let mut settings = vec![0; group_of.len()];
+    let (mut setting, mut first) = (0, order.first().copied());
+    for pair in order.windows(2) {
+        let (before, next) = (pair[0], pair[1]);
+        let apart = |from: usize| (focal_px[next] / focal_px[from]).ln();
+        // Neither a step nor a slow drift is one setting.
+        let alike = apart(before) < ZOOM_SPREAD && first.is_some_and(|first| apart(first) < 2.0 * ZOOM_SPREAD);
+        if group_of[before] != group_of[next] || !alike {
+            setting += 1;
+            first = Some(next);
+        }
+        settings[next] = setting;
+    }
+    settings
 }
 
 /// Whether overlaps of photographs whose `own` focal lengths differ from the rest of their group fit far better by
