@@ -152,6 +152,39 @@ fn a_zoom_of_one_photograph_is_noticed() {
     }
 }
 
+/// What photographs at one setting tell of its focal length counts together: of a zoom, and of a telephone with two
+/// lenses, of which the one moves corners, 500 px from the middle, by 8 px and the other by 100.
+#[test]
+fn photographs_at_one_setting_share_its_focal_length() {
+    let settings = [(700.0, -0.03), (700.0, -0.03), (350.0, -0.1), (700.0, -0.03), (700.0, -0.03), (350.0, -0.1)];
+    for bends in [0.0, 1.0] {
+        let of = |k: usize, (focal_px, k1): (f64, f64)| {
+            let one = vec![camera(focal_px, 16.0 * k as f64, 2.0 * (k % 3) as f64, ROLLS[k])];
+            bent(one, [bends * k1, 0.0, 0.0, 0.0], [0.0; 2])
+        };
+        let truth: Vec<Camera> = settings.into_iter().enumerate().flat_map(|(k, setting)| of(k, setting)).collect();
+        let cameras = estimate(&matched(&truth, 0.3, 0.0), None, &[0; 6]).cameras;
+        for (one, other) in [(0, 1), (0, 3), (0, 4), (2, 5)] {
+            assert_eq!(cameras[one].focal_px, cameras[other].focal_px, "{bends} {one} {other}");
+        }
+        for (camera, truth) in cameras.iter().zip(&truth) {
+            assert!((camera.focal_px / truth.focal_px - 1.0).abs() < 0.003, "{bends}: {}", camera.focal_px);
+        }
+    }
+}
+
+/// Two settings of a zoom, each of whose photographs is focused anew.
+#[test]
+fn a_focus_beside_a_zoom_is_found() {
+    let focal_px = [650.0, 653.0, 900.0, 647.0, 904.0, 655.0];
+    let truth: Vec<Camera> = (0..6).map(|k| camera(focal_px[k], 14.0 * k as f64, 0.0, ROLLS[k])).collect();
+    let cameras = estimate(&matched(&truth, 0.2, 0.0), None, &[0; 6]).cameras;
+    for (camera, truth) in cameras.iter().zip(&truth) {
+        let ratio = (camera.focal_px / cameras[0].focal_px) / (truth.focal_px / focal_px[0]);
+        assert!((ratio - 1.0).abs() < 0.001, "{} for {}", camera.focal_px, truth.focal_px);
+    }
+}
+
 /// An automatic focus moves the corners of photographs, 500 px from the middle, by up to 5 px. The second row has a
 /// lens besides, the third has two photographs.
 #[test]
