@@ -134,7 +134,7 @@ impl LensSearch<'_> {
             return Ok(None);
         }
         // A lens bends otherwise at another of its settings.
-        let lens_of = zoom::settings(shared, &CameraPrior::lens_groups(problem.priors));
+        let lens_of = zoom::settings(shared, problem.priors);
         let is_asked = |prior: &CameraPrior| self.kind != LensKind::Pinhole && prior.lens.is_none();
         let asked: Vec<bool> = problem.priors.iter().map(is_asked).collect();
         let own = model.with_own_focal();

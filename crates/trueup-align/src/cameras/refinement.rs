@@ -118,11 +118,14 @@ pub(super) fn refine(
         return end.refined(Found { parameters, model, per_picture_focal: false });
     }
     if per_picture_focal && problem.is_sound(&fine) {
-        let settings = zoom::settings(&fine, &CameraPrior::lens_groups(priors));
-        // What shares a factor keeps its ratios, which each photograph found for itself here.
-        let together = fine.clone().with_common_focal(&problem.start_focal_px, &settings);
-        let together = problem.coarse_to_fine(together, &IntrinsicsModel::common(&settings), context)?;
-        if let Some(FoundLenses { parameters, model }) = search.find(&together, &settings)? {
+        let settings = zoom::settings(&fine, priors);
+        let mut start = fine.clone();
+        if options.focal_sharing != FocalSharing::PerPicture {
+            // What shares a factor keeps its ratios, which each photograph found for itself here.
+            start = start.with_common_focal(&problem.start_focal_px, &settings);
+            start = problem.coarse_to_fine(start, &IntrinsicsModel::common(&settings), context)?;
+        }
+        if let Some(FoundLenses { parameters, model }) = search.find(&start, &settings)? {
             return end.refined(Found { parameters, model, per_picture_focal });
         }
     }

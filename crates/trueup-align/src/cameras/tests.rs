@@ -173,6 +173,23 @@ fn photographs_at_one_setting_share_its_focal_length() {
     }
 }
 
+/// Where each photograph is to have its own, those that are alike keep theirs, through a lens, too.
+#[test]
+fn photographs_that_are_to_have_their_own_focal_length_share_none() {
+    let focal_px = [650.0, 656.0, 645.0, 653.0, 647.0, 655.0];
+    let row = row(ROLLS).into_iter().zip(focal_px).map(|(camera, focal_px)| Camera { focal_px, ..camera }).collect();
+    let pairs = matched(&bent(row, [-0.06, 0.0, 0.0, 0.0], [0.0; 2]), 0.3, 0.0);
+    let options = CameraOptions { focal_sharing: FocalSharing::PerPicture, ..CameraOptions::default() };
+    let priors = [CameraPrior::unknown(frame(), 0); 6];
+    let input = CameraInput { priors: &priors, pairs: &pairs, curves: &[], lines: &[], reference: 0 };
+    let cameras = run(&input, &options, &StageContext::default()).expect("solvable").cameras;
+    assert!(cameras.iter().all(|camera| !camera.lens.is_pinhole()));
+    for (k, camera) in cameras.iter().enumerate().skip(1) {
+        let ratio = camera.focal_px / cameras[0].focal_px;
+        assert!((ratio / (focal_px[k] / focal_px[0]) - 1.0).abs() < 0.005 && ratio != 1.0, "{k}: {ratio}");
+    }
+}
+
 /// Two settings of a zoom, each of whose photographs is focused anew.
 #[test]
 fn a_focus_beside_a_zoom_is_found() {

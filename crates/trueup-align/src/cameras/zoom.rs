@@ -34,7 +34,7 @@ pub(super) fn found(
     own: &Parameters,
 ) -> Option<Zoomed> {
     let mut start = own.clone();
-    let mut labels = settings(own, &CameraPrior::lens_groups(problem.priors));
+    let mut labels = settings(own, problem.priors);
     if focal_ratios(model, shared, own).iter().all(|of_group| middle_half(of_group) <= ZOOM_SPREAD) {
         if !fits_far_better(problem, model, shared, own) {
             return None;
@@ -51,8 +51,9 @@ pub(super) fn found(
     Some(Zoomed { model: IntrinsicsModel::common(&labels), start })
 }
 
-/// The settings of zoomed lenses: photographs of a group whose focal lengths are alike, as a number for each.
-pub(super) fn settings(parameters: &Parameters, group_of: &[usize]) -> Vec<usize> {
+/// The settings of zoomed lenses: photographs by one lens whose focal lengths are alike, as a number for each.
+pub(super) fn settings(parameters: &Parameters, priors: &[CameraPrior]) -> Vec<usize> {
+    let group_of = CameraPrior::lens_groups(priors);
     let mut order: Vec<usize> = (0..group_of.len()).collect();
     let focal_px = &parameters.focal_px;
     order.sort_by(|&one, &two| group_of[one].cmp(&group_of[two]).then(focal_px[one].total_cmp(&focal_px[two])));
