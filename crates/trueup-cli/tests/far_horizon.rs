@@ -1,4 +1,5 @@
-//! A coast without lines: three photographs that lean and look up, level by the horizon of the sea.
+//! A coast without lines: three photographs that lean and look up, level by the horizon of the sea, and stood up by
+//! their light where they lie on their side.
 
 use std::path::Path;
 
@@ -96,4 +97,21 @@ fn a_coast_is_level_by_its_horizon() {
     assert!(!said.contains("horizon in"), "{said}");
     let without = off_upright(&desk.json("pano.json"), &truth);
     assert!(with < 0.3 && without > 2.0, "{with} and {without} degrees");
+}
+
+/// Of cameras that did not know how they were held, the files lie on their side.
+#[test]
+fn a_coast_on_its_side_is_stood_up_by_its_light() {
+    let desk = Desk::new();
+    let truth = LOOKS.map(|[yaw, pitch, roll]| camera_from_world(yaw, pitch, roll + 90.0));
+    for (k, camera) in truth.iter().enumerate() {
+        desk.put(&format!("{k}.jpg"), photograph(camera));
+    }
+    let said = stitched(desk.path(), &[]);
+    assert!(said.contains("0.jpg, 1.jpg and 2.jpg: it lies on its side in its file"), "{said}");
+    let with = off_upright(&desk.json("pano.json"), &truth);
+    let said = stitched(desk.path(), &["--set", "similarity.turned_photographs=false"]);
+    assert!(!said.contains("in its file"), "{said}");
+    let without = off_upright(&desk.json("pano.json"), &truth);
+    assert!(with < 0.3 && without > 70.0, "{with} and {without} degrees");
 }

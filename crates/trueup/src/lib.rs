@@ -68,7 +68,7 @@ pub use report::shown::ShownPhotographs;
 pub use trueup_align::cameras::{CameraOptions, FlatEvidence, LensKind, SceneModel};
 pub use trueup_align::mesh::DRAWN_BY_CAMERAS;
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
-pub use trueup_align::similarity::PriorMethod;
+pub use trueup_align::similarity::{PHOTOGRAPH_TURNED, PriorMethod};
 pub use trueup_compose::crop::Crop;
 pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::{Panorama, Rendered};

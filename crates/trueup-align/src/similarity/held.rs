@@ -3,12 +3,12 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// Roll of cameras that are held level, degrees. Reasoned.
-const EXPECTED_ROLL_DEG: f64 = 5.0;
+pub(super) const EXPECTED_ROLL_DEG: f64 = 5.0;
 /// How far photographs look up or down, degrees. Reasoned.
-const EXPECTED_PITCH_DEG: f64 = 25.0;
+pub(super) const EXPECTED_PITCH_DEG: f64 = 25.0;
 /// Square of the roll, in expected ones, of a camera that was turned on purpose, by whatever angle. Reasoned: rarer
 /// than a photograph that looks up by 60 degrees, more frequent than one of the zenith.
-const TURNED: f64 = 12.0;
+pub(super) const TURNED: f64 = 12.0;
 /// Largest angle that two cameras are rolled against each other by where both are held level, degrees. Reasoned: rolls
 /// scatter by 1 to 5 degrees, and what is turned on purpose is turned farther.
 const MAX_HELD_APART_DEG: f64 = 20.0;

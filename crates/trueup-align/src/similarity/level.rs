@@ -142,6 +142,8 @@ impl Say {
 pub(super) struct CameraLevel<'a> {
     /// The cameras' rotations, from the common frame to each camera.
     pub rotations: &'a [Matrix3<f64>],
+    /// The same as if all photographs had been stored upright.
+    pub viewed: &'a [Matrix3<f64>],
     /// By [`straighten`], as published, of the cameras that are held alike.
     pub straightened: Straightened,
     /// Down in the common frame, by the cameras, by recorded gravity and by the far horizon.
@@ -157,7 +159,17 @@ impl<'a> CameraLevel<'a> {
     /// Of the cameras with what [`straighten_with_pitch`] expects of them, but for few that were turned on purpose, and
     /// of the mean of recorded gravity, if there is any.
     pub(super) fn new(rotations: &'a [Matrix3<f64>], pitch_prior: f64, gravity: Option<MeanGravity>) -> Self {
-        let held = held_alike(rotations);
+        Self::of_viewed(rotations, rotations, pitch_prior, gravity)
+    }
+
+    /// The same where some photographs lie on their side: `viewed` are the cameras as if all were stored upright.
+    pub(super) fn of_viewed(
+        rotations: &'a [Matrix3<f64>],
+        viewed: &'a [Matrix3<f64>],
+        pitch_prior: f64,
+        gravity: Option<MeanGravity>,
+    ) -> Self {
+        let held = held_alike(viewed);
         let level = straighten_with_pitch(&held, pitch_prior);
         let cameras = Say {
             source: LevelSource::Cameras,
@@ -176,7 +188,7 @@ impl<'a> CameraLevel<'a> {
         let says: Vec<Say> = [Some(cameras), gravity].into_iter().flatten().collect();
         let has_gravity = gravity.is_some();
         let down = if has_gravity { combined(&says) } else { level };
-        Self { rotations, straightened: straighten(&held), down, held: down, has_gravity, says }
+        Self { rotations, viewed, straightened: straighten(&held), down, held: down, has_gravity, says }
     }
 
     /// The same with a far horizon that was found.
@@ -212,7 +224,7 @@ impl<'a> CameraLevel<'a> {
         };
         let held = self.says.iter().filter(|say| say.source != LevelSource::Horizon);
         let squares: f64 = held.map(|say| say.squares_beyond(down)).sum();
-        let rolls = held_roll(self.rotations, down);
+        let rolls = held_roll(self.viewed, down);
         let pitch_is_untold = !self.has_gravity && self.rotations.len() == 2;
         Some(CameraAngle {
             angle: own.angle(down),

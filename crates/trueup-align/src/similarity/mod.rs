@@ -24,6 +24,7 @@ mod printed;
 mod prior;
 mod probable_vertical;
 mod scale;
+mod sides;
 mod signed_permutation;
 mod turn_equations;
 mod turns;
@@ -56,6 +57,7 @@ use trueup_core::{Result, StageContext};
 
 use gravity::MeanGravity;
 use level::CameraLevel;
+use sides::Sides;
 use upright::{Upright, rolls};
 use vpg::Guided;
 
@@ -69,6 +71,7 @@ pub use options::{BetaMode, Fallback, GateMode, PriorMethod, SimilarityOptions};
 pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
 pub use printed::PrintedEquations;
 pub use prior::{Guidance, SimilarityPrior, VerticalSpread};
+pub use sides::PHOTOGRAPH_TURNED;
 
 /// Farthest that a far horizon may lie from what cameras and gravity tell, in their deviations. Reasoned: nothing keeps
 /// photographers from tilting all photographs alike, which their rolls do not tell.
@@ -98,7 +101,13 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     let rotations: Vec<Matrix3<f64>> = input.cameras.iter().map(Camera::rotation).collect();
     let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
     let gravity = options.gravity.then(|| MeanGravity::of(&rotations, input.gravity)).flatten();
-    let level = CameraLevel::new(&rotations, options.pitch_prior, gravity);
+    let as_stored = CameraLevel::new(&rotations, options.pitch_prior, gravity);
+    let sides = sides_of(&as_stored, input, options, context);
+    let viewed = sides.map(|sides| sides.viewed(&rotations));
+    let level = match &viewed {
+        Some(viewed) => CameraLevel::of_viewed(&rotations, viewed, options.pitch_prior, gravity),
+        None => as_stored,
+    };
     let level = with_far_horizon(level, input, options);
     let straightened = level.straightened.down;
     let unguided = |told: Vec<LevelEvidence>| {
@@ -143,6 +152,27 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     })
 }
 
+/// How photographs are turned in their files, if the method asks for the vertical, no camera recorded gravity, and it is
+/// much more probable than that none is; this is reported.
+fn sides_of(
+    as_stored: &CameraLevel<'_>,
+    input: &PriorInput<'_>,
+    options: &SimilarityOptions,
+    context: &StageContext<'_>,
+) -> Option<Sides> {
+    if !options.turned_photographs || !asks_for_vertical(input) || as_stored.has_gravity {
+        return None;
+    }
+    let sides = Sides::found(as_stored.rotations, input.shown, &as_stored.down, options.pitch_prior)?;
+    sides.report(context);
+    Some(sides)
+}
+
+/// Whether the method levels the panorama by whatever tells of the vertical.
+fn asks_for_vertical(input: &PriorInput<'_>) -> bool {
+    matches!(input.method, PriorMethod::VanishingPoints | PriorMethod::Straightening)
+}
+
 /// What is known of the vertical without lines, with the far horizon if the method asks for the vertical and the
 /// photographs show one beyond doubt.
 fn with_far_horizon<'a>(
@@ -150,8 +180,7 @@ fn with_far_horizon<'a>(
     input: &PriorInput<'_>,
     options: &SimilarityOptions,
 ) -> CameraLevel<'a> {
-    let asks = matches!(input.method, PriorMethod::VanishingPoints | PriorMethod::Straightening);
-    if !options.far_horizon || !asks {
+    if !options.far_horizon || !asks_for_vertical(input) {
         return level;
     }
     let is_plausible = |down: &Vector3<f64>| {

@@ -100,6 +100,10 @@ trueup_core::options! {
         /// Whether the far horizon of sea or plain takes part in the vertical, where photographs show it beyond doubt.
         /// Turn it off where what looks like one is not level: a long wall or a dike before the sky.
         far_horizon: bool = true, Allowed::Any, "";
+        /// Whether photographs that lie on their side or stand on their head, because no metadata tell how the camera
+        /// was held, are told by their light and by how they are turned against each other. Turn it off where some
+        /// that lie as they are meant to are turned.
+        turned_photographs: bool = true, Allowed::Any, "";
         /// What stands in for vanishing directions that are not believed. `gsp-3d` to compare with the published
         /// method.
         fallback: Fallback = Fallback::Straightening, Allowed::Any, "";

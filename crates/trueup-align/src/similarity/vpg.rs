@@ -151,7 +151,7 @@ impl<'a> SceneDirections<'a> {
         match self.options.as_printed.vertical {
             true => vertical_by_reference(frame, &self.level.rotations[self.input.reference]),
             false if self.level.has_gravity => vertical_near(frame, &self.level.down),
-            false => vertical_of(frame, self.level.rotations),
+            false => vertical_of(frame, self.level.viewed),
         }
     }
 
@@ -191,20 +191,27 @@ impl<'a> SceneDirections<'a> {
         (0..self.level.rotations.len()).filter(agrees).collect()
     }
 
-    /// The roll of each agreeing photograph by its own direction that matches the vertical: the paper's alpha_i.
+    /// The roll of each agreeing photograph by its own direction that matches the vertical: the paper's alpha_i, of
+    /// `cameras` from the common frame.
     ///
     /// # Departures
     /// Eq. 6 is printed with directions already moved to the common frame, the reference camera's, which gives every
     /// photograph about the same roll (`similarity.as_printed`); those of the camera's own frame are meant.
-    fn own_rolls(&self, frame: &Matrix3<f64>, down: &Vector3<f64>, inliers: &[usize]) -> Vec<Option<f64>> {
-        let mut own = vec![None; self.level.rotations.len()];
+    fn own_rolls(
+        &self,
+        cameras: &[Matrix3<f64>],
+        frame: &Matrix3<f64>,
+        down: &Vector3<f64>,
+        inliers: &[usize],
+    ) -> Vec<Option<f64>> {
+        let mut own = vec![None; cameras.len()];
         let in_frame = frame.tr_mul(down);
         let column = in_frame.iamax();
         for &index in inliers {
             if let Some(triad) = &self.triads[index] {
                 let matched = match_triad(frame, triad).0.column(column) * in_frame[column].signum();
                 let camera = if self.options.as_printed.alpha { self.input.reference } else { index };
-                own[index] = roll_of(&(self.level.rotations[camera] * matched));
+                own[index] = roll_of(&(cameras[camera] * matched));
             }
         }
         own
@@ -214,8 +221,8 @@ impl<'a> SceneDirections<'a> {
     fn judge(&self, dominant: &Dominant, guidance: &mut Guidance) -> Option<String> {
         let inliers = self.inliers(dominant);
         let down = self.vertical(&dominant.frame);
-        let mut magnitudes: Vec<f64> =
-            self.own_rolls(&dominant.frame, &down, &inliers).into_iter().flatten().map(f64::abs).collect();
+        let rolls = self.own_rolls(self.level.viewed, &dominant.frame, &down, &inliers);
+        let mut magnitudes: Vec<f64> = rolls.into_iter().flatten().map(f64::abs).collect();
         magnitudes.sort_by(f64::total_cmp);
         let photographs = self.level.rotations.len();
         let evidence = GateEvidence {
@@ -229,7 +236,7 @@ impl<'a> SceneDirections<'a> {
                 true => 0.0,
                 false => magnitudes.get(magnitudes.len().saturating_sub(1) / 2).copied().unwrap_or(f64::INFINITY),
             },
-            rolls: (!self.level.has_gravity).then(|| held_roll(self.level.rotations, &down)),
+            rolls: (!self.level.has_gravity).then(|| held_roll(self.level.viewed, &down)),
             by_level_lines: self.by_level_lines(&down),
         };
         guidance.divergence = Some(evidence.divergence).filter(|divergence| divergence.is_finite());
@@ -294,8 +301,10 @@ impl<'a> SceneDirections<'a> {
             true => self.corrected(&frame, axis_weights),
             false => self.level.rotations.to_vec(),
         };
-        let own =
-            if joint { common_rolls(&down, &rotations) } else { self.own_rolls(&frame, &down, &guidance.inliers) };
+        let own = match joint {
+            true => common_rolls(&down, &rotations),
+            false => self.own_rolls(self.level.rotations, &frame, &down, &guidance.inliers),
+        };
         Ok(self.solve(&down, &own, rotations, guidance))
     }
 

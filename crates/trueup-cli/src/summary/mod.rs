@@ -15,8 +15,8 @@ use std::path::Path;
 
 use trueup::{
     CARRIER_LEFT_OUT, CROP_TOO_SMALL, Crop, DRAWN_BY_CAMERAS, Diagnostic, FRAMES_PASSED_OVER, FRAMES_TAKEN,
-    FlatEvidence, FlatSceneRecord, LensKind, LineGuide, ORIENTATION_TAG_STALE, OptionValue, PROJECTION_CUT, Project,
-    RAW_DEVELOPED, Severity, Subject, Written, is_of_measures,
+    FlatEvidence, FlatSceneRecord, LensKind, LineGuide, ORIENTATION_TAG_STALE, OptionValue, PHOTOGRAPH_TURNED,
+    PROJECTION_CUT, Project, RAW_DEVELOPED, Severity, Subject, Written, is_of_measures,
 };
 
 use crate::words::file_size;
@@ -245,19 +245,20 @@ fn upright(project: &Project) -> String {
 }
 
 /// Warnings, and with `verbose` notes, that are not told elsewhere; always, that another thing was drawn than the
-/// method means, or of other files than were named, that a photograph may lie on its side, that what the camera is
-/// fixed to is not looked at, where all is wanted what the view cuts off, and that a panorama is left with its ragged
-/// borders. What was found of the figures of photographs that were `measured` before comes without advice, which is for
-/// who stitches them.
+/// method means, or of other files than were named, that a photograph may lie on its side or is taken to, that what the
+/// camera is fixed to is not looked at, where all is wanted what the view cuts off, and that a panorama is left with
+/// its ragged borders. What was found of the figures of photographs that were `measured` before comes without advice,
+/// which is for who stitches them.
 fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool, measured: Measured) {
     /// The codes of these notes.
-    const ALWAYS: [&str; 7] = [
+    const ALWAYS: [&str; 8] = [
         CARRIER_LEFT_OUT,
         CROP_TOO_SMALL,
         DRAWN_BY_CAMERAS,
         FRAMES_PASSED_OVER,
         FRAMES_TAKEN,
         ORIENTATION_TAG_STALE,
+        PHOTOGRAPH_TURNED,
         RAW_DEVELOPED,
     ];
     // Who asks for all is to know what is missing all the same.

@@ -82,6 +82,7 @@ fn fix_published_guidance(options: &mut AlignOptions) {
     similarity.vertical_only = false;
     similarity.gravity = false;
     similarity.far_horizon = false;
+    similarity.turned_photographs = false;
     similarity.pitch_prior = 0.0;
 }
 

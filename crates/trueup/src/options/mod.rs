@@ -425,6 +425,7 @@ mod tests {
             "similarity.joint_refinement",
             "similarity.pitch_prior",
             "similarity.pooled_search",
+            "similarity.turned_photographs",
             "similarity.vertical_only",
             "vanishing.intrinsics",
         ];
