@@ -108,7 +108,7 @@ fn a_coast_on_its_side_is_stood_up_by_its_light() {
         desk.put(&format!("{k}.jpg"), photograph(camera));
     }
     let said = stitched(desk.path(), &[]);
-    assert!(said.contains("0.jpg, 1.jpg and 2.jpg: it lies on its side in its file"), "{said}");
+    assert!(said.contains("0.jpg, 1.jpg, 2.jpg: it lies on its side in its file"), "{said}");
     let with = off_upright(&desk.json("pano.json"), &truth);
     let said = stitched(desk.path(), &["--set", "similarity.turned_photographs=false"]);
     assert!(!said.contains("in its file"), "{said}");

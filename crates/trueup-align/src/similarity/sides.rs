@@ -74,7 +74,8 @@ type Slope = Vector2<f64>;
 
 impl Sides {
     /// Of photographs whose cameras have `rotations`, from the common frame; `stored_level` is what is down in it if
-    /// none is turned. `None` unless it is much more probable that some are.
+    /// none is turned. `None` unless it is much more probable that some are; of two photographs, than that they are in
+    /// any other way, as two tell little of which of them is turned.
     pub(super) fn found(
         rotations: &[Matrix3<f64>],
         shown: &[ShownPhotograph<'_>],
@@ -89,11 +90,17 @@ impl Sides {
         let scene = Scene { rotations, slopes: &slopes, is_upright_format: 2 * upright_formats > shown.len() };
         let as_stored = scene.improbability(stored_level, 0);
         let tried = scene.downs(pitch_prior).flat_map(|down| (0..QUARTERS).map(move |stored| (down, stored)));
-        let costs = tried.map(|(down, stored)| (scene.improbability(&down, stored), down));
-        let (improbability, down) = costs.min_by(|one, other| one.0.total_cmp(&other.0))?;
+        let judged: Vec<(f64, Vector3<f64>)> =
+            tried.map(|(down, stored)| (scene.improbability(&down, stored), down)).collect();
+        let least = |among: &mut dyn Iterator<Item = &(f64, Vector3<f64>)>| {
+            among.copied().min_by(|one, other| one.0.total_cmp(&other.0))
+        };
+        let (improbability, down) = least(&mut judged.iter())?;
         let quarters = scene.quarters(&down);
         let is_turned = quarters.iter().any(|&quarter| quarter != 0);
-        (is_turned && as_stored - improbability > MUCH).then_some(Self { quarters })
+        let other_way = least(&mut judged.iter().filter(|(_, other)| other.angle(&down) > FRAC_PI_4));
+        let rival = other_way.filter(|_| rotations.len() == 2).map_or(as_stored, |other| as_stored.min(other.0));
+        (is_turned && rival - improbability > MUCH).then_some(Self { quarters })
     }
 
     /// Names the photographs that are turned, for who has to check it.
@@ -103,8 +110,8 @@ impl Sides {
             context.report(Diagnostic::note(
                 PHOTOGRAPH_TURNED,
                 Subject::Photograph(index),
-                format!("it {how} in its file, as light and neighbors tell, not metadata; it is stood up"),
-                "If the panorama is not upright now, give --roll 90, 180 or -90, or turn the photographs",
+                format!("it {how} in its file, whatever its metadata say: light and neighbors tell; it is stood up"),
+                "If the panorama is not upright now, give --roll 90, 180 or -90, or turn the photographs.",
             ));
         }
     }

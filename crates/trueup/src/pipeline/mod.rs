@@ -338,7 +338,10 @@ impl<'a> Stitcher<'a> {
         project.light = photographs.light();
         let (evidence, measures) = measured.unzip();
         project.measures = measures;
-        let on_side = geometry.and_then(|geometry| sideways::warning(&geometry.cameras.cameras, members));
+        let on_side = geometry.and_then(|geometry| {
+            let down = geometry.prior.level_from_world().row(1).transpose();
+            sideways::warning(&geometry.cameras.cameras, &down, members)
+        });
         let looked_at = judgement::warnings(&project, &context.findings());
         looked_at.into_iter().chain(on_side).for_each(|warning| context.report(warning));
         let layout = arrangement.drawn;
