@@ -152,8 +152,8 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     })
 }
 
-/// How photographs are turned in their files, if the method asks for the vertical, no camera recorded gravity, and it is
-/// much more probable than that none is; this is reported.
+/// How photographs are turned in their files, if the method asks for the vertical, no camera recorded gravity, and it
+/// is much more probable than that none is; this is reported.
 fn sides_of(
     as_stored: &CameraLevel<'_>,
     input: &PriorInput<'_>,
