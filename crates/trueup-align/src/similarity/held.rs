@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// Roll of cameras that are held level, degrees. Reasoned.
-pub(super) const EXPECTED_ROLL_DEG: f64 = 5.0;
+const EXPECTED_ROLL_DEG: f64 = 5.0;
 /// How far photographs look up or down, degrees. Reasoned.
-pub(super) const EXPECTED_PITCH_DEG: f64 = 25.0;
+const EXPECTED_PITCH_DEG: f64 = 25.0;
 /// Square of the roll, in expected ones, of a camera that was turned on purpose, by whatever angle. Reasoned: rarer
 /// than a photograph that looks up by 60 degrees, more frequent than one of the zenith.
 pub(super) const TURNED: f64 = 12.0;
@@ -13,13 +13,22 @@ pub(super) const TURNED: f64 = 12.0;
 /// scatter by 1 to 5 degrees, and what is turned on purpose is turned farther.
 const MAX_HELD_APART_DEG: f64 = 20.0;
 
+/// Square of a roll, by its sine, in units of what is expected.
+pub(super) fn roll_square(sine: f64) -> f64 {
+    (sine.clamp(-1.0, 1.0).asin() / EXPECTED_ROLL_DEG.to_radians()).powi(2)
+}
+
+/// The same of how far a camera looks up or down.
+pub(super) fn pitch_square(sine: f64) -> f64 {
+    (sine.clamp(-1.0, 1.0).asin() / EXPECTED_PITCH_DEG.to_radians()).powi(2)
+}
+
 /// How improbably cameras are held if the vertical is `down` or its opposite: mean squares of their roll, of which none
 /// counts for more than [`TURNED`], and of how far they look up or down, each in units of what is expected of it.
 pub(super) fn improbability(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> f64 {
-    let square = |sine: f64, expected_deg: f64| (sine.clamp(-1.0, 1.0).asin() / expected_deg.to_radians()).powi(2);
     let of_one = |rotation: &Matrix3<f64>| {
         let seen = rotation * down;
-        square(seen.x, EXPECTED_ROLL_DEG).min(TURNED) + square(seen.z, EXPECTED_PITCH_DEG)
+        roll_square(seen.x).min(TURNED) + pitch_square(seen.z)
     };
     rotations.iter().map(of_one).sum::<f64>() / rotations.len() as f64
 }

@@ -17,6 +17,7 @@
 //! they are stored as they were seen turns them.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::StageContext;
@@ -24,7 +25,7 @@ use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::geometry::{roll_from_down, rotation_about_z, wrap_angle};
 use trueup_core::raster::Raster;
 
-use super::held::{EXPECTED_PITCH_DEG, EXPECTED_ROLL_DEG, TURNED};
+use super::held::{TURNED, pitch_square, roll_square};
 use crate::far_horizon::ShownPhotograph;
 use crate::straightening::straighten_with_pitch;
 
@@ -88,19 +89,15 @@ impl Sides {
         let slopes: Vec<Slope> = shown.iter().map(|one| slope(one.thumbnail)).collect();
         let upright_formats = shown.iter().filter(|one| one.frame.height > one.frame.width).count();
         let scene = Scene { rotations, slopes: &slopes, is_upright_format: 2 * upright_formats > shown.len() };
-        let as_stored = scene.improbability(stored_level, 0);
-        let tried = scene.downs(pitch_prior).flat_map(|down| (0..QUARTERS).map(move |stored| (down, stored)));
+        let as_stored = scene.improbability(stored_level, 0..1);
         let judged: Vec<(f64, Vector3<f64>)> =
-            tried.map(|(down, stored)| (scene.improbability(&down, stored), down)).collect();
-        let least = |among: &mut dyn Iterator<Item = &(f64, Vector3<f64>)>| {
-            among.copied().min_by(|one, other| one.0.total_cmp(&other.0))
-        };
-        let (improbability, down) = least(&mut judged.iter())?;
+            scene.downs(pitch_prior).map(|down| (scene.improbability(&down, 0..QUARTERS), down)).collect();
+        let (improbability, down) = judged.iter().copied().min_by(|one, other| one.0.total_cmp(&other.0))?;
         let quarters = scene.quarters(&down);
         let is_turned = quarters.iter().any(|&quarter| quarter != 0);
-        let other_way = least(&mut judged.iter().filter(|(_, other)| other.angle(&down) > FRAC_PI_4));
-        let rival = other_way.filter(|_| rotations.len() == 2).map_or(as_stored, |other| as_stored.min(other.0));
-        (is_turned && rival - improbability > MUCH).then_some(Self { quarters })
+        let is_rival = |other: &Vector3<f64>| rotations.len() == 2 && other.angle(&down) > FRAC_PI_4;
+        let rivals = judged.iter().filter(|(_, other)| is_rival(other)).map(|(improbability, _)| *improbability);
+        (is_turned && rivals.fold(as_stored, f64::min) - improbability > MUCH).then_some(Self { quarters })
     }
 
     /// Names the photographs that are turned, for who has to check it.
@@ -158,21 +155,21 @@ impl Scene<'_> {
         self.rotations.iter().map(of_one).collect()
     }
 
-    /// How improbable it is that `down` is down and most photographs have to be turned by `stored` quarters, as minus a
-    /// logarithm and but for a constant.
-    fn improbability(&self, down: &Vector3<f64>, stored: u8) -> f64 {
-        let storing = match stored {
+    /// How improbable it is that `down` is down, as minus a logarithm and but for a constant, where most photographs
+    /// have to be turned by whichever of these numbers of quarters is the least improbable.
+    fn improbability(&self, down: &Vector3<f64>, stored: Range<u8>) -> f64 {
+        let lit = self.lit(down);
+        let storing = |stored: u8| match stored {
             0 => 0.0,
             2 => ON_HEAD,
             _ if self.is_upright_format => ON_HEAD,
             _ => ON_SIDE,
         };
-        storing + self.held(down, stored) + self.lit(down)
+        stored.map(|stored| storing(stored) + self.held(down, stored) + lit).fold(f64::INFINITY, f64::min)
     }
 
-    /// The same of how cameras are held.
+    /// The same of how cameras are held, if most have to be turned by `stored` quarters.
     fn held(&self, down: &Vector3<f64>, stored: u8) -> f64 {
-        let square = |angle: f64, expected_deg: f64| (angle / expected_deg.to_radians()).powi(2);
         let of_one = |rotation: &Matrix3<f64>| {
             let seen = rotation * down;
             let (roll, sine) = (roll_from_down(&seen), seen.xy().norm());
@@ -184,10 +181,10 @@ impl Scene<'_> {
                     _ => QUARTER_APART,
                 };
                 let is_nearest = left.abs() <= FRAC_PI_4;
-                is_nearest.then(|| apart + square((left.sin() * sine).clamp(-1.0, 1.0).asin(), EXPECTED_ROLL_DEG))
+                is_nearest.then(|| apart + roll_square(left.sin() * sine))
             };
             let least = (0..QUARTERS).filter_map(turned).fold(TURNED, f64::min);
-            least + square(seen.z.clamp(-1.0, 1.0).asin(), EXPECTED_PITCH_DEG)
+            least + pitch_square(seen.z)
         };
         let count = self.rotations.len() as f64;
         let mean = self.rotations.iter().map(of_one).sum::<f64>() / count;
