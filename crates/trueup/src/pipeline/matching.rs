@@ -22,6 +22,9 @@ use crate::workers::Division;
 /// The code of pairs that are joined by what is coarse alone.
 pub(crate) const JOINED_BY_COARSE: &str = "joined-by-coarse-features";
 
+/// The code of two photographs alone that are joined although what lies between their matches looks different.
+pub(crate) const JOINED_ALTHOUGH_DIFFERENT: &str = "joined-although-different";
+
 /// What the phase works on. Photographs are counted 0..N; `features`, `coarse`, `frames`, `told`, `usable`, `images`
 /// and `keys` have N entries.
 #[derive(Debug)]
@@ -97,6 +100,7 @@ pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageCon
     context.gather(|context| {
         let pairs = context.time("matching", || match_pairs(input, options, context))?;
         let matches = context.time("matching", || look_again(input, judged(input, pairs), options, context))?;
+        let matches = context.time("matching", || trusted_if_alone(input, matches, options, context))?;
         let known = without(&matches.strangers, &matches.pairs);
         // A marked photograph is meant to stand for itself beside others of its view.
         let unmarked = |pair: &&PairMatches| [pair.a, pair.b].iter().all(|&one| !input.marked[one]);
@@ -160,6 +164,28 @@ fn look_again(input: &MatchInput, first: Matches, options: &MatchOptions, contex
         matches = judged(input, pairs);
     }
     Ok(matches)
+}
+
+/// Joins two photographs that are all there is although what lies between their matches looks different: who gives two
+/// means that they overlap, and clouds, leaves and water that moved look so as well as equal things in different places.
+fn trusted_if_alone(
+    input: &MatchInput,
+    matches: Matches,
+    options: &MatchOptions,
+    context: &StageContext,
+) -> Result<Matches> {
+    let is_alone = input.usable.iter().filter(|&&usable| usable).count() == 2;
+    let differing = matches.pairs.iter().find(|pair| pair.verdict == PairVerdict::LooksDifferent);
+    let Some(alone) = differing.filter(|_| is_alone).map(|pair| [(pair.a, pair.b)]) else { return Ok(matches) };
+    let trusting = MatchInput { wished: &alone, ..*input };
+    let found = match_candidates(&trusting, &alone, Look::First, options, context)?;
+    context.report(Diagnostic::warning(
+        JOINED_ALTHOUGH_DIFFERENT,
+        Subject::Pair(alone[0].0, alone[0].1),
+        "what lies between their matches looks different, as where clouds moved, or as equal things in different places do",
+        "If things stand together that do not belong together, shoot one frame between them.",
+    ));
+    Ok(judged(input, replaced(matches.pairs, found, false)))
 }
 
 /// The pairs with those `found` in the place of their own first look; in the order of photographs, unless they are
@@ -258,7 +284,12 @@ fn match_candidates(
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+
+    use trueup_core::raster::Photograph;
+
     use super::*;
+    use crate::inputs::Inputs;
     use crate::memo::PhotographCache;
     use crate::options::StitchOptions;
     use crate::pipeline::{Alignment, Stitcher};
@@ -316,5 +347,45 @@ mod tests {
         let aligned = stitcher.align(&room_in_memory(|photograph| photograph)).expect("a panorama");
         assert!(coarse(&aligned.alignments[0]).is_empty());
         assert_eq!(cache.uses().get("pair").map_or(0, |pairs| pairs.made), 10);
+    }
+
+    /// Height from which on a photograph is changed, as a share of it: enough matches are left above it, few enough
+    /// for what lies below to be compared.
+    const CHANGED_FROM: f64 = 0.4;
+
+    /// The room's photographs, of the second of which what lies below [`CHANGED_FROM`] is mirrored: it is nowhere in the
+    /// others.
+    fn room_in_which_the_second_changed() -> Inputs {
+        let seen = Cell::new(0);
+        room_in_memory(|photograph| {
+            let index = seen.replace(seen.get() + 1);
+            match photograph {
+                Photograph::Eight(mut raster) if index == 1 => {
+                    let first = (CHANGED_FROM * raster.height() as f64) as usize;
+                    let (width, channels) = (raster.width(), raster.channels());
+                    for row in raster.data_mut().chunks_exact_mut(width * channels).skip(first) {
+                        let mirrored: Vec<u8> = row.chunks_exact(channels).rev().flatten().copied().collect();
+                        row.copy_from_slice(&mirrored);
+                    }
+                    Photograph::Eight(raster)
+                }
+                unchanged => unchanged,
+            }
+        })
+    }
+
+    #[test]
+    fn two_photographs_alone_are_joined_although_what_lies_between_their_matches_differs() {
+        let (options, context) = (StitchOptions::default(), StageContext::default());
+        let warned = |photographs: usize| {
+            let mut inputs = room_in_which_the_second_changed();
+            inputs.photographs.truncate(photographs);
+            let aligned = Stitcher::new(&options, &context).align(&inputs).expect("a panorama").alignments.remove(0);
+            let is_warning = |one: &Diagnostic| one.code == JOINED_ALTHOUGH_DIFFERENT;
+            (aligned.project.used(), aligned.project.diagnostics.iter().filter(|one| is_warning(one)).count())
+        };
+        assert_eq!(warned(2), (2, 1));
+        // Beside others, what looks different is believed to be.
+        assert_eq!(warned(3).1, 0);
     }
 }
