@@ -69,7 +69,7 @@ impl BestFrame {
 
     /// The one near that of another focal length.
     fn followed(vote: &LineVote, from: &Self) -> Self {
-        let frame = vote.refine_frame(&from.frame, AxisWeights::new(0, 1.0, 1.0));
+        let frame = vote.refine_frame(&from.frame, AxisWeights::alike(0));
         Self { frame, fit: vote.fit(&frame), significance: None }
     }
 }

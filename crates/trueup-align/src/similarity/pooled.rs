@@ -78,7 +78,7 @@ impl SceneDirections<'_> {
             return None;
         }
         let pooled = self.standing_out(pooled)?;
-        let own = self.vote.refine_frame(&own.frame, AxisWeights::new(0, 1.0, 1.0));
+        let own = self.vote.refine_frame(&own.frame, AxisWeights::alike(0));
         if self.vote.fit(&pooled.frame) <= OUTVOTED * self.vote.fit(&own) {
             return None;
         }
@@ -98,7 +98,7 @@ impl SceneDirections<'_> {
         if !self.is_out_of_reach(&self.vertical(&own.frame)) || self.inliers(own).len() < MIN_AGREEING {
             return false;
         }
-        let refined = self.vote.refine_frame(&own.frame, AxisWeights::new(0, 1.0, 1.0));
+        let refined = self.vote.refine_frame(&own.frame, AxisWeights::alike(0));
         let down = self.vertical(frame);
         let nearest = refined.column(column_near(&refined, &down)).into_owned();
         let is_other = nearest.dot(&down).abs() < joint::TOLERANCE_DEG.to_radians().cos();

@@ -225,7 +225,7 @@ fn photographs_that_contradict_each_other_leave_the_vertical_uncertain() {
         let vote = LineVote::new(&rotations, (0..rotations.len()).map(planes).collect());
         // The true frame in the cameras' world.
         let frame = rotations[0].transpose() * scene.world_from_camera[0].transpose();
-        let weights = AxisWeights::new(1, 1.0, 1.0);
+        let weights = AxisWeights::alike(1);
         let start = vote.refine_frame(&frame, weights);
         let refinement = Refinement { start: &start, axes_used: 3, axis_weights: weights };
         jackknife::deviation(&covariance_by_photographs(&vote, refinement, 1))

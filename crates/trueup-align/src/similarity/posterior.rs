@@ -139,7 +139,7 @@ impl UprightScene {
             frame: level,
             vertical: 0,
             axes_used: 1,
-            axis_weights: AxisWeights::new(0, 1.0, 0.0),
+            axis_weights: AxisWeights::alike(0).upright_alone(),
             spread: None,
         };
         match (&prior.guidance.dominant, prior.guidance.used) {

@@ -424,7 +424,8 @@ impl<'a> SceneDirections<'a> {
         }
         let (first, second) = orthonormal_complement(&peak.down);
         let frame = Matrix3::from_columns(&[peak.down, first, second]);
-        let refinement = Refinement { start: &frame, axes_used: 1, axis_weights: AxisWeights::new(0, 1.0, 0.0) };
+        let refinement =
+            Refinement { start: &frame, axes_used: 1, axis_weights: AxisWeights::alike(0).upright_alone() };
         let covariance = self.covariance(refinement, 0, None, false);
         let refused = guidance.clone();
         let Ok(down) = self.weighed(&peak.down, &covariance, guidance) else {

@@ -84,7 +84,7 @@ pub(super) fn reconciled(vote: &LineVote, frame: &Matrix3<f64>, vertical: usize,
     let level: Vector3<f64> = level_frame.column(vertical).into_owned();
     let tangent = Matrix3x2::from_columns(&[first, second]);
     let upright_refinement =
-        Refinement { start: &upright_frame, axes_used: 1, axis_weights: AxisWeights::new(0, 1.0, 0.0) };
+        Refinement { start: &upright_frame, axes_used: 1, axis_weights: AxisWeights::alike(0).upright_alone() };
     let level_refinement = Refinement { start: &level_frame, axes_used: 3, axis_weights: level_weights };
     let (upright_scatter, is_narrow) = scatter(vote, upright_refinement, 0)?;
     let (level_scatter, _) = scatter(vote, level_refinement, vertical)?;

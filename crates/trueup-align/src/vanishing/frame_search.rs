@@ -64,7 +64,7 @@ impl PooledFrames {
     /// frame stand out is what it is known by. `None` without any.
     pub(crate) fn refined(&self, vote: &LineVote) -> Option<Matrix3<f64>> {
         let refine = |start: &Matrix3<f64>| {
-            let frame = vote.refine_frame(start, AxisWeights::new(0, 1.0, 1.0));
+            let frame = vote.refine_frame(start, AxisWeights::alike(0));
             (frame, vote.fit(&frame))
         };
         let refined: Vec<(Matrix3<f64>, f64)> = self.starts.par_iter().map(refine).collect();

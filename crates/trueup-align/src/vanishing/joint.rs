@@ -48,6 +48,11 @@ impl AxisWeights {
         Self { vertical, upright, level }
     }
 
+    /// All segments as they are; upright ones are along the axis `vertical`.
+    pub(crate) fn alike(vertical: usize) -> Self {
+        Self::new(vertical, 1.0, 1.0)
+    }
+
     /// The same for upright segments, none for level ones.
     pub(crate) fn upright_alone(self) -> Self {
         Self { level: 0.0, ..self }
@@ -190,7 +195,7 @@ impl LineVote {
 
     /// The same of each segment, by photograph, where each photograph's own segments turn the frame for it.
     pub(crate) fn fits_of_own(&self, frame: &Matrix3<f64>) -> Vec<Vec<f64>> {
-        let refinement = Refinement { start: frame, axes_used: 3, axis_weights: AxisWeights::new(0, 1.0, 1.0) };
+        let refinement = Refinement { start: frame, axes_used: 3, axis_weights: AxisWeights::alike(0) };
         let of_photograph = |(index, photograph): (usize, &PhotographLines)| {
             let own = self.refine(refinement, scales(), |one| one.photograph == index);
             photograph.fits(&own).collect()
@@ -280,7 +285,11 @@ impl LineVote {
 
     /// The frame whose first column alone is refined: the direction that segments near it point to.
     pub(crate) fn refine_first_axis(&self, start: &Matrix3<f64>) -> Matrix3<f64> {
-        self.refine(Refinement { start, axes_used: 1, axis_weights: AxisWeights::new(0, 1.0, 0.0) }, scales(), |_| true)
+        self.refine(
+            Refinement { start, axes_used: 1, axis_weights: AxisWeights::alike(0).upright_alone() },
+            scales(),
+            |_| true,
+        )
     }
 
     /// Normal matrix and gradient, in px^2 per rad^2 and px^2 per rad, of the squared residuals of photograph `index`
