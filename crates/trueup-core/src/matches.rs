@@ -75,6 +75,8 @@ pub enum PairVerdict {
     Joined,
     /// The user's graph says that they overlap, and enough matches agree to use it.
     JoinedByGraph,
+    /// Few matches agree, but all that they lay over each other looks alike.
+    JoinedByLooks,
     /// Fewer putative matches than a homography needs.
     TooFewMatches,
     /// The best homography folds, mirrors or explodes the photograph.
@@ -89,7 +91,7 @@ pub enum PairVerdict {
 impl PairVerdict {
     /// Whether the pair is an edge of the stitch graph.
     pub fn is_joined(self) -> bool {
-        matches!(self, Self::Joined | Self::JoinedByGraph)
+        matches!(self, Self::Joined | Self::JoinedByGraph | Self::JoinedByLooks)
     }
 }
 

@@ -1,7 +1,5 @@
 //! Speed of the exhaustive search and of the verification of a pair, on generated descriptors.
 
-use std::collections::BTreeSet;
-
 use divan::Bencher;
 use rand::{Rng, RngExt};
 use rayon::ThreadPool;
@@ -9,7 +7,7 @@ use trueup_core::StageContext;
 use trueup_core::source::WorkingFrame;
 use trueup_core::told_lens::ToldLens;
 use trueup_vision::features::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint, Features};
-use trueup_vision::matching::{MatchingInput, MatchingOptions, Nearest, SearchKernel, putative_matches, run};
+use trueup_vision::matching::{Demand, MatchingInput, MatchingOptions, Nearest, SearchKernel, putative_matches, run};
 
 /// Features of a photograph at the detector's cap.
 const FEATURES: usize = 8000;
@@ -80,10 +78,9 @@ fn verify_half_outliers(bencher: Bencher) {
     let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
     let options = MatchingOptions::default();
     let context = StageContext::default();
-    let forced = BTreeSet::new();
     let told = [ToldLens::default(); 2];
-    let input =
-        MatchingInput { features: &features, frames: &[frame; 2], told: &told, pairs: &[(0, 1)], forced: &forced };
+    let (frames, demand) = (&[frame; 2], Demand::Test);
+    let input = MatchingInput { features: &features, frames, told: &told, pairs: &[(0, 1)], demand };
     let pool = pool(1);
     bencher.bench_local(|| pool.install(|| run(&input, &options, &context)));
 }

@@ -54,6 +54,7 @@ fn in_words(verdict: PairVerdict) -> &'static str {
     match verdict {
         PairVerdict::Joined => "joined",
         PairVerdict::JoinedByGraph => "joined, as the graph file says",
+        PairVerdict::JoinedByLooks => "joined, as all that they lay over each other looks alike",
         PairVerdict::TooFewMatches => "too few details look alike",
         PairVerdict::ImplausibleHomography => "they fit together in no possible way",
         PairVerdict::TooFewInliers => "too few of them agree",

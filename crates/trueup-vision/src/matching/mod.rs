@@ -30,9 +30,8 @@ mod tests;
 mod turned;
 mod written;
 
-use std::collections::BTreeSet;
-
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use trueup_core::matches::PairMatches;
 use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
@@ -52,6 +51,18 @@ pub(crate) use search::{squared_distance, squared_distances};
 use crate::features::{FeatureSource, Features, no_photograph};
 use pair::{PairInput, PhotographFeatures, match_pair};
 
+/// What a pair must show to be joined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Demand {
+    /// As many agreeing matches as the test of a pair wants, and nothing between them that looks different.
+    Test,
+    /// That, or two fifths of [`MatchingOptions::min_inliers`] that agree, if all that they lay over each other looks
+    /// alike.
+    FewIfAlike,
+    /// The few agreeing matches that suffice where the user says that the photographs overlap, whatever they look like.
+    Graph,
+}
+
 /// What matching reads.
 #[derive(Debug, Clone, Copy)]
 pub struct MatchingInput<'a> {
@@ -63,8 +74,8 @@ pub struct MatchingInput<'a> {
     pub told: &'a [ToldLens],
     /// The pairs to match, by the photographs' indices.
     pub pairs: &'a [(usize, usize)],
-    /// Those (smaller index first) that the user's graph joins.
-    pub forced: &'a BTreeSet<(usize, usize)>,
+    /// What each of them must show to be joined.
+    pub demand: Demand,
 }
 
 impl<'a> MatchingInput<'a> {
@@ -84,8 +95,8 @@ impl<'a> MatchingInput<'a> {
 /// the pairs, each naming the smaller index first.
 ///
 /// A pair is joined if its homography is believable in the overlap it predicts, and the matches that agree with it are
-/// at least `min_inliers` and pass the Brown-Lowe test, unless what lies between them looks different. Of a pair that
-/// the user's graph joins, fewer must agree.
+/// at least `min_inliers` and pass the Brown-Lowe test, unless what lies between them looks different. [`Demand`] says of
+/// which pairs fewer must agree.
 ///
 /// # Errors
 /// [`trueup_core::Error::Options`]; [`trueup_core::Error::Input`] if a pair names a photograph that is not there or
@@ -105,9 +116,8 @@ pub fn run(
             let a = group[0].0;
             let of_a = input.features.features(a)?;
             let match_one = |&(_, b): &(usize, usize)| {
-                let forced = input.forced.contains(&(a.min(b), a.max(b)));
                 let of_b = input.features.features(b)?;
-                let pair = PairInput::new(input.photograph(a, &of_a)?, input.photograph(b, &of_b)?, forced);
+                let pair = PairInput::new(input.photograph(a, &of_a)?, input.photograph(b, &of_b)?, input.demand);
                 let matches = match_pair(&pair, options, context)?;
                 context.progress().advance(STAGE, 1);
                 Ok(matches)

@@ -12,7 +12,20 @@ trueup_core::options! {
         inlier_px: f64 = 5.0, between(0.5, 50.0), "working px";
         /// Fewest agreeing matches of a joined pair. Lower it for small overlaps with little texture, which helps as
         /// far as these have few matches: more than 8 and three tenths of those in the overlap must agree in any case.
+        /// Of a photograph that is left over, two fifths of it suffice where all that its matches lay over another one
+        /// looks alike.
         /// Raise it where pairs are joined that do not overlap.
         min_inliers: usize = 15, between(4.0, 10000.0), "matches", basic;
+    }
+}
+
+/// The share of `min_inliers` that suffices where all that the matches lay over each other looks alike: six of 15, two
+/// more than fix a homography.
+const SHARE_IF_ALIKE: f64 = 0.4;
+
+impl MatchingOptions {
+    /// Fewest agreeing matches of a pair that is joined because all that they lay over each other looks alike.
+    pub fn fewest_if_alike(&self) -> usize {
+        (SHARE_IF_ALIKE * self.min_inliers as f64).ceil() as usize
     }
 }

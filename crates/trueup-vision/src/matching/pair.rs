@@ -10,6 +10,7 @@ use trueup_core::source::WorkingFrame;
 use trueup_core::told_lens::ToldLens;
 use trueup_core::{Error, Result, StageContext};
 
+use super::Demand;
 use super::compared::{ComparedPair, MAX_SAMPLES};
 use super::consistent::matches_elsewhere;
 use super::matched_points::MatchedPoints;
@@ -72,15 +73,15 @@ pub(super) struct PhotographFeatures<'a> {
 pub(super) struct PairInput<'a> {
     pub(super) a: PhotographFeatures<'a>,
     pub(super) b: PhotographFeatures<'a>,
-    /// Whether the user's graph joins them.
-    pub(super) forced: bool,
+    /// What they must show to be joined.
+    pub(super) demand: Demand,
 }
 
 impl<'a> PairInput<'a> {
     /// Of two photographs in any order.
-    pub(super) fn new(one: PhotographFeatures<'a>, other: PhotographFeatures<'a>, forced: bool) -> Self {
+    pub(super) fn new(one: PhotographFeatures<'a>, other: PhotographFeatures<'a>, demand: Demand) -> Self {
         let (a, b) = if one.index <= other.index { (one, other) } else { (other, one) };
-        Self { a, b, forced }
+        Self { a, b, demand }
     }
 
     fn check(&self) -> Result<()> {
@@ -102,19 +103,19 @@ impl<'a> PairInput<'a> {
     }
 
     /// How many matches must agree when `in_overlap` lie in the predicted overlap: as many as the test wants, or those
-    /// few that suffice for a pair `forced`.
-    fn needed(in_overlap: usize, forced: bool, options: &MatchingOptions) -> usize {
+    /// few that suffice for a pair of the user's graph.
+    fn needed(in_overlap: usize, demand: Demand, options: &MatchingOptions) -> usize {
         let more_than = BROWN_LOWE_ALPHA + BROWN_LOWE_BETA * in_overlap as f64;
         let tested = options.min_inliers.max(more_than.floor() as usize + 1);
-        if forced { MIN_INLIERS_BY_GRAPH.min(tested) } else { tested }
+        if demand == Demand::Graph { MIN_INLIERS_BY_GRAPH.min(tested) } else { tested }
     }
 
     /// The verdict on a pair whose matches are counted.
     fn judge(&self, pair: &mut PairMatches, options: &MatchingOptions) {
-        pair.needed = Self::needed(pair.in_overlap, self.forced, options);
-        pair.verdict = if pair.agreeing >= Self::needed(pair.in_overlap, false, options) {
+        pair.needed = Self::needed(pair.in_overlap, self.demand, options);
+        pair.verdict = if pair.agreeing >= Self::needed(pair.in_overlap, Demand::Test, options) {
             PairVerdict::Joined
-        } else if self.forced && pair.agreeing >= pair.needed {
+        } else if self.demand == Demand::Graph && pair.agreeing >= pair.needed {
             PairVerdict::JoinedByGraph
         } else {
             PairVerdict::TooFewInliers
@@ -157,8 +158,7 @@ fn better_turn(
 /// A pair is joined if its homography is believable in the overlap it predicts, and the matches that agree with it are
 /// at least `min_inliers` and more than alpha + beta n_f of the n_f matches in that overlap. Where they are
 /// `min_inliers` and not enough, those on further planes and elsewhere in depth count with them. It is not joined where
-/// little else in the overlap matches or looks alike ([`Resemblance`]). A forced pair needs only
-/// [`MIN_INLIERS_BY_GRAPH`].
+/// little else in the overlap matches or looks alike ([`Resemblance`]). [`Demand`] says of which pairs fewer must agree.
 ///
 /// # Errors
 /// [`Error::Options`]; [`Error::Input`] if the photographs are the same or features contradict themselves;
@@ -178,7 +178,7 @@ pub(super) fn match_pair(
     options.check()?;
     input.check()?;
     context.check_cancelled()?;
-    let PairInput { a, b, forced } = *input;
+    let PairInput { a, b, demand } = *input;
     let compared = ComparedPair::new([(a.features, a.frame), (b.features, b.frame)], options);
     let ComparedPair { putative, points, .. } = &compared;
     let mut pair = PairMatches {
@@ -187,7 +187,7 @@ pub(super) fn match_pair(
         putative: putative.len(),
         in_overlap: 0,
         agreeing: 0,
-        needed: PairInput::needed(0, forced, options),
+        needed: PairInput::needed(0, demand, options),
         verdict: PairVerdict::TooFewMatches,
         b_from_a: None,
         inliers: PointMatches::default(),
@@ -231,20 +231,25 @@ pub(super) fn match_pair(
     // Before strong parallax no plane alone explains enough of the matches: what else two cameras explain counts as
     // well.
     let is_promising = pair.verdict == PairVerdict::TooFewInliers && pair.agreeing >= options.min_inliers;
-    if pair.verdict.is_joined() || is_promising {
+    let suffices_if_alike = demand == Demand::FewIfAlike && pair.agreeing >= options.fewest_if_alike();
+    if pair.verdict.is_joined() || is_promising || suffices_if_alike {
         let modeled = ModeledPair { input, putative, points, model: &model };
         let explained = modeled.explained(&mut generator, &mut context.generator("matches elsewhere", seed));
         if is_promising {
             pair.agreeing = explained.all.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
             input.judge(&mut pair, options);
         }
-        // Who names a pair in a graph knows better.
-        if pair.verdict == PairVerdict::Joined && !forced {
-            let resemblance = Resemblance { a: a.features, b: b.features, overlap: &overlap };
-            if resemblance.is_missing(pair.in_overlap) {
-                pair.verdict = PairVerdict::LooksDifferent;
+        let resemblance = Resemblance { a: a.features, b: b.features, overlap: &overlap };
+        pair.verdict = match pair.verdict {
+            // Who names a pair in a graph knows better.
+            PairVerdict::Joined if demand != Demand::Graph && resemblance.is_missing(pair.in_overlap) => {
+                PairVerdict::LooksDifferent
             }
-        }
+            PairVerdict::TooFewInliers if suffices_if_alike && resemblance.is_confirmed(pair.agreeing) => {
+                PairVerdict::JoinedByLooks
+            }
+            verdict => verdict,
+        };
         if pair.verdict.is_joined() {
             pair.inliers = explained.inliers.into();
             pair.elsewhere = explained.elsewhere.into();

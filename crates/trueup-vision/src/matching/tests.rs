@@ -50,11 +50,11 @@ impl PhotographPair {
         }
     }
 
-    fn matched(&self, forced: bool, options: &MatchingOptions) -> PairMatches {
+    fn matched(&self, demand: Demand, options: &MatchingOptions) -> PairMatches {
         let frame = frame();
         let a = PhotographFeatures { index: 0, features: &self.a, frame: &frame, told: ToldLens::default() };
         let b = PhotographFeatures { index: 1, features: &self.b, frame: &frame, told: ToldLens::default() };
-        let input = PairInput { a, b, forced };
+        let input = PairInput { a, b, demand };
         match_pair(&input, options, &StageContext::default()).expect("valid scene")
     }
 
@@ -190,7 +190,7 @@ proptest! {
         scene.add_plane(&example_map(), 80, 0.5, &mut generator);
         scene.add_outliers(120, &mut generator);
         // Noise may push matches at the border out of the predicted overlap.
-        let pair = scene.matched(false, &MatchingOptions::default());
+        let pair = scene.matched(Demand::Test, &MatchingOptions::default());
         prop_assert_eq!(pair.verdict, PairVerdict::Joined);
         prop_assert!((76..=86).contains(&pair.agreeing));
         let rows = pair.b_from_a.expect("joined");
@@ -206,7 +206,7 @@ fn both_planes_of_a_scene_are_found() {
     let mut scene = PhotographPair::default();
     scene.add_plane(&shift(-200.0), 120, 0.3, &mut generator);
     scene.add_plane(&shift(-230.0), 70, 0.3, &mut generator);
-    let pair = scene.matched(false, &MatchingOptions::default());
+    let pair = scene.matched(Demand::Test, &MatchingOptions::default());
     assert_eq!(pair.verdict, PairVerdict::Joined);
     assert!((120..130).contains(&pair.agreeing));
     assert!(pair.inliers.len() >= 188, "{}", pair.inliers.len());
@@ -219,7 +219,7 @@ fn few_matches_are_no_plane_of_their_own() {
     let mut scene = PhotographPair::default();
     scene.add_plane(&shift(-200.0), 120, 0.3, &mut generator);
     scene.add_plane(&shift(-230.0), 35, 0.3, &mut generator);
-    let pair = scene.matched(false, &MatchingOptions::default());
+    let pair = scene.matched(Demand::Test, &MatchingOptions::default());
     assert!((120..130).contains(&pair.agreeing));
     assert_eq!(pair.inliers.len(), pair.agreeing);
 }
@@ -231,7 +231,7 @@ fn a_plane_far_from_the_global_homography_is_left_out() {
     let mut scene = PhotographPair::default();
     scene.add_plane(&shift(-100.0), 120, 0.3, &mut generator);
     scene.add_plane(&shift(-400.0), 70, 0.3, &mut generator);
-    assert_eq!(scene.matched(false, &MatchingOptions::default()).inliers.len(), 120);
+    assert_eq!(scene.matched(Demand::Test, &MatchingOptions::default()).inliers.len(), 120);
 }
 
 #[test]
@@ -242,13 +242,13 @@ fn unrelated_photographs_are_not_joined() {
         push(&mut scene.a, random_place(&mut generator), &[random_descriptor(&mut generator)]);
         push(&mut scene.b, random_place(&mut generator), &[random_descriptor(&mut generator)]);
     }
-    let pair = scene.matched(false, &MatchingOptions::default());
+    let pair = scene.matched(Demand::Test, &MatchingOptions::default());
     assert_eq!((pair.verdict, pair.b_from_a), (PairVerdict::TooFewMatches, None));
     for seed in 0..20 {
         let mut scene = PhotographPair::default();
         scene.add_outliers(60, &mut StageContext::default().generator("outliers", seed));
-        for forced in [false, true] {
-            let pair = scene.matched(forced, &MatchingOptions::default());
+        for demand in [Demand::Test, Demand::Graph] {
+            let pair = scene.matched(demand, &MatchingOptions::default());
             assert!(!pair.verdict.is_joined() && pair.inliers.is_empty() && pair.agreeing < 8, "{pair:?}");
         }
     }
@@ -257,10 +257,10 @@ fn unrelated_photographs_are_not_joined() {
 #[test]
 fn nothing_matches_nothing() {
     let mut scene = PhotographPair::default();
-    assert_eq!(scene.matched(false, &MatchingOptions::default()).verdict, PairVerdict::TooFewMatches);
+    assert_eq!(scene.matched(Demand::Test, &MatchingOptions::default()).verdict, PairVerdict::TooFewMatches);
     let mut generator = generator(3);
     scene.add_plane(&example_map(), 3, 0.0, &mut generator);
-    let pair = scene.matched(true, &MatchingOptions::default());
+    let pair = scene.matched(Demand::Graph, &MatchingOptions::default());
     assert_eq!((pair.putative, pair.verdict, pair.confidence()), (3, PairVerdict::TooFewMatches, 0.0));
 }
 
@@ -272,7 +272,7 @@ fn collinear_matches_have_no_homography() {
         let place = Vector2::new(f64::from(k) * 12.0, 300.0);
         scene.add(place, place, &mut generator);
     }
-    let pair = scene.matched(false, &MatchingOptions::default());
+    let pair = scene.matched(Demand::Test, &MatchingOptions::default());
     assert_eq!((pair.verdict, pair.b_from_a), (PairVerdict::TooFewInliers, None));
 }
 
@@ -282,7 +282,7 @@ fn a_homography_that_explodes_the_photograph_is_not_believed() {
     let mut scene = PhotographPair::default();
     let explosion = Homography(Matrix3::new(6.0, 0.0, -2000.0, 0.0, 6.0, -1500.0, 0.0, 0.0, 1.0));
     scene.add_plane(&explosion, 60, 0.3, &mut generator);
-    let pair = scene.matched(true, &MatchingOptions::default());
+    let pair = scene.matched(Demand::Graph, &MatchingOptions::default());
     assert_eq!((pair.verdict, pair.b_from_a), (PairVerdict::ImplausibleHomography, None));
 }
 
@@ -291,9 +291,9 @@ fn the_users_graph_joins_pairs_with_fewer_inliers() {
     let mut generator = generator(5);
     let mut scene = PhotographPair::default();
     scene.add_plane(&example_map(), 10, 0.3, &mut generator);
-    let alone = scene.matched(false, &MatchingOptions::default());
+    let alone = scene.matched(Demand::Test, &MatchingOptions::default());
     assert_eq!((alone.verdict, alone.agreeing, alone.needed), (PairVerdict::TooFewInliers, 10, 15));
-    let forced = scene.matched(true, &MatchingOptions::default());
+    let forced = scene.matched(Demand::Graph, &MatchingOptions::default());
     assert_eq!((forced.verdict, forced.needed, forced.inliers.len()), (PairVerdict::JoinedByGraph, 8, 10));
 }
 
@@ -309,13 +309,12 @@ fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         let context = StageContext::default();
         let options = MatchingOptions::default();
-        let forced = BTreeSet::new();
         let input = MatchingInput {
             features: &features,
             frames: &frames,
             told: &[ToldLens::default(); 3],
             pairs: &pairs,
-            forced: &forced,
+            demand: Demand::Test,
         };
         let matched = pool.install(|| run(&input, &options, &context));
         let matched = matched.expect("valid photographs");
@@ -341,7 +340,7 @@ fn a_few_matches_elsewhere_in_depth_are_not_believed() {
             let in_a = Vector2::new(500.0 + 17.0 * (k % 4) as f64, 250.0 + 19.0 * (k / 4) as f64);
             photographs.add(in_a, example_map().apply(in_a) + Vector2::new(14.0, 0.0), &mut generator);
         }
-        let matched = photographs.matched(false, &MatchingOptions::default());
+        let matched = photographs.matched(Demand::Test, &MatchingOptions::default());
         assert!(matched.inliers.len() >= 200);
         matched.elsewhere.len()
     };
@@ -369,7 +368,7 @@ fn matches_elsewhere_in_depth_are_believed_if_what_surrounds_them_is_found_again
         };
         photographs.a.surroundings = waves(&|place| place);
         photographs.b.surroundings = waves(&in_scene);
-        let matched = photographs.matched(false, &MatchingOptions::default());
+        let matched = photographs.matched(Demand::Test, &MatchingOptions::default());
         assert!(matched.inliers.len() >= 200);
         matched.elsewhere.len()
     };
@@ -392,7 +391,7 @@ fn what_lies_before_a_plane_joins_a_pair_with_it() {
             photographs.add(in_a, example_map().apply(in_a) + nearer + Vector2::new(0.0, aside), &mut generator);
         }
         photographs.add_outliers(60, &mut generator);
-        photographs.matched(false, &MatchingOptions::default())
+        photographs.matched(Demand::Test, &MatchingOptions::default())
     };
     let joined = matched(true);
     assert_eq!(joined.verdict, PairVerdict::Joined, "{} of {}", joined.agreeing, joined.needed);
@@ -412,7 +411,7 @@ fn matches_are_placed_by_what_surrounds_them() {
     photographs.add_plane(&truth, 200, 0.6, &mut generator(31));
     photographs.a.surroundings = waves(&|place| place);
     photographs.b.surroundings = waves(&|place| back.apply(place));
-    let matched = photographs.matched(false, &MatchingOptions::default());
+    let matched = photographs.matched(Demand::Test, &MatchingOptions::default());
     let error = |one: &PointMatch| (Vector2::from(one.in_b) - truth.apply(one.in_a.into())).norm();
     let exact = matched.inliers.iter().filter(|one| error(one) < 0.05).count();
     assert!(
@@ -427,7 +426,7 @@ fn contradictory_input_is_an_error() {
     let (frame, context) = (frame(), StageContext::default());
     let match_with = |features: &Features, index: usize| {
         let a = PhotographFeatures { index: 0, features, frame: &frame, told: ToldLens::default() };
-        let pair = PairInput::new(a, PhotographFeatures { index, ..a }, false);
+        let pair = PairInput::new(a, PhotographFeatures { index, ..a }, Demand::Test);
         match_pair(&pair, &MatchingOptions::default(), &context)
     };
     let good = levels(&[(0.0, &[1])]);
@@ -438,13 +437,12 @@ fn contradictory_input_is_an_error() {
     assert!(matches!(match_with(&nowhere, 1), Err(Error::Input { .. })));
     let colored = Features { surroundings: Raster::new(9, 9, 3), ..levels(&[(0.0, &[1])]) };
     assert!(matches!(match_with(&colored, 1), Err(Error::Input { .. })));
-    let forced = BTreeSet::new();
     let input = MatchingInput {
         features: &[good],
         frames: &[frame],
         told: &[ToldLens::default()],
         pairs: &[(0, 1)],
-        forced: &forced,
+        demand: Demand::Test,
     };
     let missing = run(&input, &MatchingOptions::default(), &context);
     assert!(matches!(missing, Err(Error::Input { .. })));
@@ -455,7 +453,7 @@ fn contradictory_input_is_an_error() {
 #[test]
 fn photographs_of_equal_things_among_others_are_not_joined() {
     let back = Homography(example_map().0.try_inverse().expect("regular"));
-    let verdict = |scene_from_b: &dyn Fn(Vector2<f64>) -> Vector2<f64>, is_forced: bool| {
+    let verdict = |scene_from_b: &dyn Fn(Vector2<f64>) -> Vector2<f64>, demand: Demand| {
         let mut generator = generator(20);
         let mut photographs = PhotographPair::default();
         photographs.add_plane(&example_map(), 40, 0.3, &mut generator);
@@ -467,13 +465,41 @@ fn photographs_of_equal_things_among_others_are_not_joined() {
         }
         photographs.a.surroundings = waves(&|place| place);
         photographs.b.surroundings = waves(scene_from_b);
-        let pair = photographs.matched(is_forced, &MatchingOptions::default());
+        let pair = photographs.matched(demand, &MatchingOptions::default());
         assert_eq!(pair.inliers.is_empty(), !pair.verdict.is_joined());
         (pair.verdict, pair.agreeing >= pair.needed)
     };
     let elsewhere = |place: Vector2<f64>| Vector2::new(1.4 * place.y, 1.3 * place.x);
-    assert_eq!(verdict(&|place| back.apply(place), false), (PairVerdict::Joined, true));
-    assert_eq!(verdict(&elsewhere, false), (PairVerdict::LooksDifferent, true));
+    assert_eq!(verdict(&|place| back.apply(place), Demand::Test), (PairVerdict::Joined, true));
+    assert_eq!(verdict(&elsewhere, Demand::Test), (PairVerdict::LooksDifferent, true));
     // Who names the pair in a graph knows better.
-    assert_eq!(verdict(&elsewhere, true), (PairVerdict::Joined, true));
+    assert_eq!(verdict(&elsewhere, Demand::Graph), (PairVerdict::Joined, true));
+}
+
+/// Overlapping by 70 px of 800, two photographs have 13 matches, where 15 are needed.
+#[test]
+fn few_matches_suffice_where_all_that_they_lay_over_each_other_looks_alike() {
+    let b_from_a = Homography(Matrix3::new(1.0, 0.0, 70.0 - WIDTH, 0.0, 1.0, 3.0, 0.0, 0.0, 1.0));
+    let back = Homography(b_from_a.0.try_inverse().expect("regular"));
+    let verdict = |scene_from_b: &dyn Fn(Vector2<f64>) -> Vector2<f64>, demand: Demand| {
+        let mut generator = generator(21);
+        let mut photographs = PhotographPair::default();
+        photographs.add_plane(&b_from_a, 13, 0.3, &mut generator);
+        for features in [&mut photographs.a, &mut photographs.b] {
+            for k in 0..825 {
+                let place = Vector2::new(f64::from(k % 33), f64::from(k / 33)) * 24.0;
+                push(features, place + Vector2::new(15.0, 14.0), &[random_descriptor(&mut generator)]);
+            }
+        }
+        photographs.a.surroundings = waves(&|place| place);
+        photographs.b.surroundings = waves(scene_from_b);
+        let pair = photographs.matched(demand, &MatchingOptions::default());
+        assert_eq!(pair.inliers.is_empty(), !pair.verdict.is_joined());
+        (pair.verdict, pair.agreeing)
+    };
+    let elsewhere = |place: Vector2<f64>| Vector2::new(1.4 * place.y, 1.3 * place.x);
+    let there = |place: Vector2<f64>| back.apply(place);
+    assert_eq!(verdict(&there, Demand::Test), (PairVerdict::TooFewInliers, 13));
+    assert_eq!(verdict(&there, Demand::FewIfAlike), (PairVerdict::JoinedByLooks, 13));
+    assert_eq!(verdict(&elsewhere, Demand::FewIfAlike), (PairVerdict::TooFewInliers, 13));
 }

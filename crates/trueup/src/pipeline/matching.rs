@@ -12,7 +12,7 @@ use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::told_lens::ToldLens;
 use trueup_core::{Result, StageContext};
 use trueup_vision::features::FeatureSource;
-use trueup_vision::matching::{self, Stranger, StrangersInput};
+use trueup_vision::matching::{self, Demand, Stranger, StrangersInput};
 use trueup_vision::pairing::{Apart, Likeness, Proposals, likeness, pairs_apart};
 
 use crate::memo::{Key, KeyMaker, LIKENESS, Memo, PAIR};
@@ -21,6 +21,9 @@ use crate::workers::Division;
 
 /// The code of pairs that are joined by what is coarse alone.
 pub(crate) const JOINED_BY_COARSE: &str = "joined-by-coarse-features";
+
+/// The code of pairs of which few matches agree, but all that these lay over each other looks alike.
+pub(crate) const JOINED_BY_LOOKS: &str = "joined-by-looks";
 
 /// The code of two photographs alone that are joined although what lies between their matches looks different.
 pub(crate) const JOINED_ALTHOUGH_DIFFERENT: &str = "joined-although-different";
@@ -51,6 +54,13 @@ pub(crate) struct MatchInput<'a> {
     pub memo: Memo<'a>,
     /// Who matches pairs elsewhere.
     pub workers: Option<Division<'a>>,
+}
+
+impl MatchInput<'_> {
+    /// What pairs must show to be joined.
+    fn demand(&self) -> Demand {
+        if self.wished.is_empty() { Demand::Test } else { Demand::Graph }
+    }
 }
 
 /// What the phase makes of them.
@@ -100,6 +110,7 @@ pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageCon
     context.gather(|context| {
         let pairs = context.time("matching", || match_pairs(input, options, context))?;
         let matches = context.time("matching", || look_again(input, judged(input, pairs), options, context))?;
+        let matches = context.time("matching", || join_by_looks(input, matches, options, context))?;
         let matches = context.time("matching", || trusted_if_alone(input, matches, options, context))?;
         let known = without(&matches.strangers, &matches.pairs);
         // A marked photograph is meant to stand for itself beside others of its view.
@@ -146,7 +157,7 @@ fn look_again(input: &MatchInput, first: Matches, options: &MatchOptions, contex
         if candidates.is_empty() {
             break;
         }
-        let mut found = match_candidates(input, &candidates, Look::Coarse, options, context)?;
+        let mut found = match_candidates(input, &candidates, Look::Coarse, input.demand(), options, context)?;
         found.retain(|pair| pair.verdict.is_joined());
         if found.is_empty() {
             break;
@@ -166,6 +177,43 @@ fn look_again(input: &MatchInput, first: Matches, options: &MatchOptions, contex
     Ok(matches)
 }
 
+/// Joins the pairs that are apart for want of agreeing matches, and of which all that these lay over each other looks
+/// alike: photographs that are noisy, coarsely compressed or that share little, as the tiles of a scan.
+fn join_by_looks(
+    input: &MatchInput,
+    matches: Matches,
+    options: &MatchOptions,
+    context: &StageContext,
+) -> Result<Matches> {
+    let groups = &matches.graph.components;
+    let group_of = |photograph: usize| groups.iter().position(|group| group.contains(&photograph));
+    let is_in_question = |pair: &&PairMatches| {
+        pair.verdict == PairVerdict::TooFewInliers
+            && pair.agreeing >= options.matching.fewest_if_alike()
+            && [pair.a, pair.b].iter().all(|&one| !is_stranger(&matches.strangers, one))
+            && group_of(pair.a) != group_of(pair.b)
+    };
+    let candidates: Vec<(usize, usize)> =
+        matches.pairs.iter().filter(is_in_question).map(|pair| (pair.a, pair.b)).collect();
+    if candidates.is_empty() || !input.wished.is_empty() {
+        return Ok(matches);
+    }
+    let mut found = match_candidates(input, &candidates, Look::First, Demand::FewIfAlike, options, context)?;
+    found.retain(|pair| pair.verdict.is_joined());
+    for pair in &found {
+        context.report(Diagnostic::note(
+            JOINED_BY_LOOKS,
+            Subject::Pair(pair.a, pair.b),
+            format!(
+                "only {} of {} matches agree, but all that they lay over each other looks alike",
+                pair.agreeing, pair.putative
+            ),
+            "If things stand together that do not belong together, leave one of the photographs out.",
+        ));
+    }
+    if found.is_empty() { Ok(matches) } else { Ok(judged(input, replaced(matches.pairs, found, false))) }
+}
+
 /// Joins two photographs that are all there is although what lies between their matches looks different: who gives two
 /// means that they overlap, and clouds, leaves and water that moved look so as well as equal things in different places.
 fn trusted_if_alone(
@@ -177,8 +225,7 @@ fn trusted_if_alone(
     let is_alone = input.usable.iter().filter(|&&usable| usable).count() == 2;
     let differing = matches.pairs.iter().find(|pair| pair.verdict == PairVerdict::LooksDifferent);
     let Some(alone) = differing.filter(|_| is_alone).map(|pair| [(pair.a, pair.b)]) else { return Ok(matches) };
-    let trusting = MatchInput { wished: &alone, ..*input };
-    let found = match_candidates(&trusting, &alone, Look::First, options, context)?;
+    let found = match_candidates(input, &alone, Look::First, Demand::Graph, options, context)?;
     context.report(Diagnostic::warning(
         JOINED_ALTHOUGH_DIFFERENT,
         Subject::Pair(alone[0].0, alone[0].1),
@@ -214,14 +261,14 @@ fn strangers(input: &MatchInput, pairs: &[PairMatches]) -> Vec<Stranger> {
 /// Every pair tried: those wished for in their order, or those proposed, ascending.
 fn match_pairs(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Vec<PairMatches>> {
     if !input.wished.is_empty() {
-        return match_candidates(input, input.wished, Look::First, options, context);
+        return match_candidates(input, input.wished, Look::First, input.demand(), options, context);
     }
     let looks = || known_likeness(input, Look::First, options, context);
     let mut proposals = Proposals::new(input.features, input.frames, &options.pairing, looks)?;
     let mut all: Vec<PairMatches> = Vec::new();
     let mut candidates = proposals.next(&[]);
     while !candidates.is_empty() {
-        let matched = match_candidates(input, &candidates, Look::First, options, context)?;
+        let matched = match_candidates(input, &candidates, Look::First, input.demand(), options, context)?;
         candidates = proposals.next(&matched);
         all.extend(matched);
     }
@@ -241,16 +288,16 @@ fn match_candidates(
     input: &MatchInput,
     candidates: &[(usize, usize)],
     look: Look,
+    demand: Demand,
     options: &MatchOptions,
     context: &StageContext,
 ) -> Result<Vec<PairMatches>> {
     let is_usable = |&(a, b): &(usize, usize)| input.usable[a] && input.usable[b];
     let candidates: Vec<(usize, usize)> = candidates.iter().copied().filter(is_usable).collect();
-    let forced: BTreeSet<(usize, usize)> = input.wished.iter().copied().collect();
     let told = input.told;
     let content = |a: usize, b: usize| {
         let (of_a, of_b) = (input.keys[a].as_ref()?, input.keys[b].as_ref()?);
-        let maker = KeyMaker::new().key(of_a).key(of_b).part(&forced.contains(&(a, b)));
+        let maker = KeyMaker::new().key(of_a).key(of_b).part(&demand);
         Some(look.key(maker.part(&[told[a], told[b]])))
     };
     let key = |a: usize, b: usize| input.memo.key(PAIR, content(a, b), options);
@@ -269,7 +316,7 @@ fn match_candidates(
         let seen: BTreeSet<usize> = missing.iter().flat_map(|&(a, b)| [a, b]).collect();
         seen.into_par_iter().try_for_each(|one| features.features(one).map(drop))?;
     }
-    let unmatched = matching::MatchingInput { features, frames, told, pairs: &missing, forced: &forced };
+    let unmatched = matching::MatchingInput { features, frames, told, pairs: &missing, demand };
     let found = match input.workers {
         Some(workers) => workers.matched(&unmatched, context)?,
         None => matching::run(&unmatched, &options.matching, context)?,
@@ -387,5 +434,24 @@ mod tests {
         assert_eq!(warned(2), (2, 1));
         // Beside others, what looks different is believed to be.
         assert_eq!(warned(3).1, 0);
+    }
+
+    /// The room's first two photographs have half of the agreeing matches that are asked for, in coarse looks as well, and
+    /// show the same.
+    #[test]
+    fn few_matches_join_what_looks_alike() {
+        let context = StageContext::default();
+        let aligned = |options: &StitchOptions| {
+            let mut inputs = room_in_memory(|photograph| photograph);
+            inputs.photographs.truncate(2);
+            Stitcher::new(options, &context).align(&inputs).expect("a panorama").alignments.remove(0).project
+        };
+        let mut options = StitchOptions::default();
+        let [pair] = aligned(&options).pairs.try_into().expect("one pair");
+        assert_eq!(pair.verdict, PairVerdict::Joined);
+        options.matching.matching.min_inliers = 2 * pair.inliers;
+        let by_looks = aligned(&options);
+        assert_eq!(by_looks.pairs[0].verdict, PairVerdict::JoinedByLooks);
+        assert!(by_looks.diagnostics.iter().any(|one| one.code == JOINED_BY_LOOKS));
     }
 }

@@ -84,7 +84,7 @@ impl<'a> Division<'a> {
     /// # Errors
     /// Those of the workers; [`trueup_core::Error::Cancelled`].
     pub(crate) fn matched(&self, input: &MatchingInput, context: &StageContext) -> Result<Vec<PairMatches>> {
-        let MatchingInput { features, frames, told, pairs, forced } = *input;
+        let MatchingInput { features, frames, told, pairs, demand } = *input;
         const STAGE: &str = MatchingOptions::STAGE;
         context.progress().begin(STAGE, pairs.len() as u64);
         let common = Common::new(self.options, Vec::new(), Kind::Match);
@@ -98,9 +98,10 @@ impl<'a> Division<'a> {
             let photographs = photographs_of(number);
             // Ascending: which of a pair comes first is the same as here.
             let place = |photograph: usize| photographs.partition_point(|&other| other < photograph);
-            let pair = |&(a, b): &(usize, usize)| (place(a), place(b), forced.contains(&(a, b)));
+            let pair = |&(a, b): &(usize, usize)| (place(a), place(b));
             Ok(MatchTask {
                 pairs: tasks[number].iter().map(pair).collect(),
+                demand,
                 photographs: photographs
                     .iter()
                     .map(|&one| Ok(FeaturesOfOne::new(features.features(one)?.as_ref(), frames[one], told[one])))

@@ -14,6 +14,7 @@ use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::told_lens::ToldLens;
 use trueup_core::{Error, Result};
 use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
+use trueup_vision::matching::Demand;
 
 use crate::memo::PROGRAM;
 use crate::options::StitchOptions;
@@ -72,8 +73,10 @@ pub(super) type MeasureResult = Vec<Option<Reported<Measured>>>;
 pub(super) struct MatchTask {
     /// The photographs in them, ascending.
     pub photographs: Vec<FeaturesOfOne>,
-    /// By the places in `photographs`, the smaller first, and whether the user's graph joins them.
-    pub pairs: Vec<(usize, usize, bool)>,
+    /// By the places in `photographs`, the smaller first.
+    pub pairs: Vec<(usize, usize)>,
+    /// What they must show to be joined.
+    pub demand: Demand,
 }
 
 /// What came of them, in their order, photographs numbered as in the task.

@@ -6,6 +6,7 @@ use trueup_compose::render::Rendered;
 use trueup_core::{Error, StageContext};
 use trueup_io::decode;
 use trueup_io::source::InMemory;
+use trueup_vision::matching::Demand;
 
 use super::*;
 use crate::inputs::Inputs;
@@ -168,6 +169,7 @@ fn another_version_is_refused() {
         &context,
     )
     .expect("a worker");
-    let stranger: tasks::MatchTask = tasks::MatchTask { photographs: Vec::new(), pairs: vec![(0, 1, false)] };
+    let stranger: tasks::MatchTask =
+        tasks::MatchTask { photographs: Vec::new(), pairs: vec![(0, 1)], demand: Demand::Test };
     assert!(worker.run(&tasks::written(&stranger).expect("written"), &context).is_err(), "no such photographs");
 }

@@ -1,7 +1,5 @@
 //! Who does tasks.
 
-use std::collections::BTreeSet;
-
 use trueup_compose::render::{self, RenderInput};
 use trueup_core::scratch::NoScratch;
 use trueup_core::{Error, Result, StageContext};
@@ -105,7 +103,7 @@ impl Worker {
     }
 
     fn matched(&self, task: MatchTask, context: &StageContext) -> Result<MatchResult> {
-        let MatchTask { photographs, pairs: wanted } = task;
+        let MatchTask { photographs, pairs, demand } = task;
         let restored: Option<Vec<_>> = photographs.into_iter().map(super::tasks::FeaturesOfOne::restored).collect();
         let (mut features, mut frames, mut told) = (Vec::new(), Vec::new(), Vec::new());
         for (of_one, frame, lens) in restored.ok_or_else(|| damaged("descriptors"))? {
@@ -113,10 +111,7 @@ impl Worker {
             frames.push(frame);
             told.push(lens);
         }
-        let pairs: Vec<(usize, usize)> = wanted.iter().map(|&(a, b, _)| (a, b)).collect();
-        let forced: BTreeSet<(usize, usize)> =
-            wanted.iter().filter(|(.., forced)| *forced).map(|&(a, b, _)| (a.min(b), a.max(b))).collect();
-        let input = MatchingInput { features: &features, frames: &frames, told: &told, pairs: &pairs, forced: &forced };
+        let input = MatchingInput { features: &features, frames: &frames, told: &told, pairs: &pairs, demand };
         matching::run(&input, &self.common.options.matching.matching, context)
     }
 
