@@ -95,8 +95,8 @@ impl<'a> MatchingInput<'a> {
 /// the pairs, each naming the smaller index first.
 ///
 /// A pair is joined if its homography is believable in the overlap it predicts, and the matches that agree with it are
-/// at least `min_inliers` and pass the Brown-Lowe test, unless what lies between them looks different. [`Demand`] says of
-/// which pairs fewer must agree.
+/// at least `min_inliers` and pass the Brown-Lowe test, unless what lies between them looks different. [`Demand`] says
+/// of which pairs fewer must agree.
 ///
 /// # Errors
 /// [`trueup_core::Error::Options`]; [`trueup_core::Error::Input`] if a pair names a photograph that is not there or

@@ -158,7 +158,8 @@ fn better_turn(
 /// A pair is joined if its homography is believable in the overlap it predicts, and the matches that agree with it are
 /// at least `min_inliers` and more than alpha + beta n_f of the n_f matches in that overlap. Where they are
 /// `min_inliers` and not enough, those on further planes and elsewhere in depth count with them. It is not joined where
-/// little else in the overlap matches or looks alike ([`Resemblance`]). [`Demand`] says of which pairs fewer must agree.
+/// little else in the overlap matches or looks alike ([`Resemblance`]). [`Demand`] says of which pairs fewer must
+/// agree.
 ///
 /// # Errors
 /// [`Error::Options`]; [`Error::Input`] if the photographs are the same or features contradict themselves;

@@ -80,8 +80,8 @@ impl Resemblance<'_> {
         alike.get(alike.len() / 4).is_some_and(|&quartile| quartile < LEAST_ALIKE)
     }
 
-    /// Whether all that the `agreeing` matches lay over each other looks alike, and they are not too few for that. False
-    /// where too little is known of what surrounds features.
+    /// Whether all that the `agreeing` matches lay over each other looks alike, and they are not too few for that.
+    /// False where too little is known of what surrounds features.
     pub(super) fn is_confirmed(&self, agreeing: usize) -> bool {
         let textured = self.all_textured(self.places());
         if (agreeing as f64) < FEWEST_MATCHED * textured.len() as f64 {

@@ -215,7 +215,8 @@ fn join_by_looks(
 }
 
 /// Joins two photographs that are all there is although what lies between their matches looks different: who gives two
-/// means that they overlap, and clouds, leaves and water that moved look so as well as equal things in different places.
+/// means that they overlap, and clouds, leaves and water that moved look so as well as equal things in different
+/// places.
 fn trusted_if_alone(
     input: &MatchInput,
     matches: Matches,
@@ -400,8 +401,8 @@ mod tests {
     /// for what lies below to be compared.
     const CHANGED_FROM: f64 = 0.4;
 
-    /// The room's photographs, of the second of which what lies below [`CHANGED_FROM`] is mirrored: it is nowhere in the
-    /// others.
+    /// The room's photographs, of the second of which what lies below [`CHANGED_FROM`] is mirrored: it is nowhere in
+    /// the others.
     fn room_in_which_the_second_changed() -> Inputs {
         let seen = Cell::new(0);
         room_in_memory(|photograph| {
@@ -436,8 +437,8 @@ mod tests {
         assert_eq!(warned(3).1, 0);
     }
 
-    /// The room's first two photographs have half of the agreeing matches that are asked for, in coarse looks as well, and
-    /// show the same.
+    /// The room's first two photographs have half of the agreeing matches that are asked for, in coarse looks as well,
+    /// and show the same.
     #[test]
     fn few_matches_join_what_looks_alike() {
         let context = StageContext::default();
