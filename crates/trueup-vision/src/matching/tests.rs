@@ -448,25 +448,38 @@ fn contradictory_input_is_an_error() {
     assert!(matches!(missing, Err(Error::Input { .. })));
 }
 
+/// Two photographs of which `count` matches agree with one map, each of which shows 825 features more. The one shows
+/// waves, the other the same ones where `scene_from_b` leads.
+fn matched_among_others(
+    b_from_a: &Homography,
+    count: usize,
+    seed: u64,
+    scene_from_b: &dyn Fn(Vector2<f64>) -> Vector2<f64>,
+    demand: Demand,
+) -> PairMatches {
+    let mut generator = generator(seed);
+    let mut photographs = PhotographPair::default();
+    photographs.add_plane(b_from_a, count, 0.3, &mut generator);
+    for features in [&mut photographs.a, &mut photographs.b] {
+        for k in 0..825 {
+            let place = Vector2::new(f64::from(k % 33), f64::from(k / 33)) * 24.0;
+            push(features, place + Vector2::new(15.0, 14.0), &[random_descriptor(&mut generator)]);
+        }
+    }
+    photographs.a.surroundings = waves(&|place| place);
+    photographs.b.surroundings = waves(scene_from_b);
+    let pair = photographs.matched(demand, &MatchingOptions::default());
+    assert_eq!(pair.inliers.is_empty(), !pair.verdict.is_joined());
+    pair
+}
+
 /// 40 matches agree with one map, as those of equal things do; each photograph shows 800 features more, which are told
 /// by what surrounds them.
 #[test]
 fn photographs_of_equal_things_among_others_are_not_joined() {
     let back = Homography(example_map().0.try_inverse().expect("regular"));
     let verdict = |scene_from_b: &dyn Fn(Vector2<f64>) -> Vector2<f64>, demand: Demand| {
-        let mut generator = generator(20);
-        let mut photographs = PhotographPair::default();
-        photographs.add_plane(&example_map(), 40, 0.3, &mut generator);
-        for features in [&mut photographs.a, &mut photographs.b] {
-            for k in 0..825 {
-                let place = Vector2::new(f64::from(k % 33), f64::from(k / 33)) * 24.0;
-                push(features, place + Vector2::new(15.0, 14.0), &[random_descriptor(&mut generator)]);
-            }
-        }
-        photographs.a.surroundings = waves(&|place| place);
-        photographs.b.surroundings = waves(scene_from_b);
-        let pair = photographs.matched(demand, &MatchingOptions::default());
-        assert_eq!(pair.inliers.is_empty(), !pair.verdict.is_joined());
+        let pair = matched_among_others(&example_map(), 40, 20, scene_from_b, demand);
         (pair.verdict, pair.agreeing >= pair.needed)
     };
     let elsewhere = |place: Vector2<f64>| Vector2::new(1.4 * place.y, 1.3 * place.x);
@@ -482,19 +495,7 @@ fn few_matches_suffice_where_all_that_they_lay_over_each_other_looks_alike() {
     let b_from_a = Homography(Matrix3::new(1.0, 0.0, 70.0 - WIDTH, 0.0, 1.0, 3.0, 0.0, 0.0, 1.0));
     let back = Homography(b_from_a.0.try_inverse().expect("regular"));
     let verdict = |scene_from_b: &dyn Fn(Vector2<f64>) -> Vector2<f64>, demand: Demand| {
-        let mut generator = generator(21);
-        let mut photographs = PhotographPair::default();
-        photographs.add_plane(&b_from_a, 13, 0.3, &mut generator);
-        for features in [&mut photographs.a, &mut photographs.b] {
-            for k in 0..825 {
-                let place = Vector2::new(f64::from(k % 33), f64::from(k / 33)) * 24.0;
-                push(features, place + Vector2::new(15.0, 14.0), &[random_descriptor(&mut generator)]);
-            }
-        }
-        photographs.a.surroundings = waves(&|place| place);
-        photographs.b.surroundings = waves(scene_from_b);
-        let pair = photographs.matched(demand, &MatchingOptions::default());
-        assert_eq!(pair.inliers.is_empty(), !pair.verdict.is_joined());
+        let pair = matched_among_others(&b_from_a, 13, 21, scene_from_b, demand);
         (pair.verdict, pair.agreeing)
     };
     let elsewhere = |place: Vector2<f64>| Vector2::new(1.4 * place.y, 1.3 * place.x);

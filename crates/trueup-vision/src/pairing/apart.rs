@@ -32,6 +32,18 @@ impl Apart<'_> {
         group_of
     }
 
+    /// Whether both photographs of a pair, the smaller index first, take part, belong to different groups and were not
+    /// tried.
+    pub fn is_apart(&self) -> impl Fn(&(usize, usize)) -> bool + '_ {
+        let group_of = self.group_of();
+        move |&(a, b)| {
+            b < self.usable.len()
+                && [a, b].iter().all(|&one| self.usable[one])
+                && group_of[a] != group_of[b]
+                && !self.tried.contains(&(a, b))
+        }
+    }
+
     /// Whether any photograph that takes part is outside of the largest group.
     pub fn is_any_outside(&self) -> bool {
         self.groups.iter().skip(1).flatten().any(|&one| self.usable.get(one) == Some(&true))
@@ -53,27 +65,22 @@ pub fn pairs_apart<'a, E>(
         return Ok(Vec::new());
     }
     let (count, group_of) = (apart.usable.len(), apart.group_of());
-    let is_apart = |&(a, b): &(usize, usize)| {
-        b < count
-            && [a, b].iter().all(|&one| apart.usable[one])
-            && group_of[a] != group_of[b]
-            && !apart.tried.contains(&(a, b))
-    };
+    let is_apart = apart.is_apart();
     if !apart.wished.is_empty() {
         let wished: BTreeSet<(usize, usize)> = apart.wished.iter().map(|&(a, b)| ordered(a, b)).collect();
-        return Ok(wished.into_iter().filter(is_apart).collect());
+        return Ok(wished.into_iter().filter(&is_apart).collect());
     }
     if count <= options.exhaustive_up_to {
-        return Ok(all_pairs(count).into_iter().filter(is_apart).collect());
+        return Ok(all_pairs(count).into_iter().filter(&is_apart).collect());
     }
     let Likeness(alike) = likeness()?;
     let mut pairs = BTreeSet::new();
     for one in (0..count).filter(|&one| group_of[one] != 0) {
         let others = alike.get(one).into_iter().flatten().map(|&other| ordered(one, other));
-        pairs.extend(others.filter(is_apart).take(options.neighbors));
+        pairs.extend(others.filter(&is_apart).take(options.neighbors));
         if options.consecutive {
             let next = [one.checked_sub(1), one.checked_add(1)];
-            pairs.extend(next.into_iter().flatten().map(|other| ordered(one, other)).filter(is_apart));
+            pairs.extend(next.into_iter().flatten().map(|other| ordered(one, other)).filter(&is_apart));
         }
     }
     Ok(pairs.into_iter().collect())

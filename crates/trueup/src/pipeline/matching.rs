@@ -1,5 +1,6 @@
 //! The match phase: from features to matched pairs and their graph, as far as they are not known from earlier runs.
-//! Photographs that are left over are looked at again, by what is coarse in them.
+//! Photographs that are left over are looked at again, by what is coarse in them, and by what their few matches lay
+//! over each other.
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -102,7 +103,7 @@ impl Look {
 }
 
 /// Matches the pairs of photographs that are worth it, or those wished for; where photographs are left over, those once
-/// more by what is coarse.
+/// more by what is coarse, and then by what their few matches lay over each other. Two photographs alone are trusted.
 ///
 /// # Errors
 /// Those of [`likeness`], [`Proposals::new`] and [`matching::run`].
@@ -136,6 +137,11 @@ fn is_stranger(strangers: &[Stranger], photograph: usize) -> bool {
     strangers.iter().any(|stranger| stranger.photograph == photograph)
 }
 
+/// Whether each photograph can be used and is none of the `strangers`.
+fn usable(input: &MatchInput, strangers: &[Stranger]) -> Vec<bool> {
+    (0..input.usable.len()).map(|one| input.usable[one] && !is_stranger(strangers, one)).collect()
+}
+
 /// Looks at the pairs that are apart by what is coarse, and joins those that overlap by that; a pair that does not
 /// keeps its verdict. Where nothing is left over, nothing is looked at.
 fn look_again(input: &MatchInput, first: Matches, options: &MatchOptions, context: &StageContext) -> Result<Matches> {
@@ -149,8 +155,7 @@ fn look_again(input: &MatchInput, first: Matches, options: &MatchOptions, contex
         None => known_likeness(input, Look::Coarse, options, context).map(|likeness| known.get_or_init(|| likeness)),
     };
     loop {
-        let is_usable = |one: usize| input.usable[one] && !is_stranger(&matches.strangers, one);
-        let usable: Vec<bool> = (0..input.usable.len()).map(is_usable).collect();
+        let usable = usable(input, &matches.strangers);
         let groups = &matches.graph.components;
         let apart = Apart { groups, usable: &usable, wished: input.wished, tried: &tried };
         let candidates = pairs_apart(&apart, &options.pairing, looks)?;
@@ -185,17 +190,17 @@ fn join_by_looks(
     options: &MatchOptions,
     context: &StageContext,
 ) -> Result<Matches> {
-    let groups = &matches.graph.components;
-    let group_of = |photograph: usize| groups.iter().position(|group| group.contains(&photograph));
+    if !input.wished.is_empty() {
+        return Ok(matches);
+    }
     let is_in_question = |pair: &&PairMatches| {
-        pair.verdict == PairVerdict::TooFewInliers
-            && pair.agreeing >= options.matching.fewest_if_alike()
-            && [pair.a, pair.b].iter().all(|&one| !is_stranger(&matches.strangers, one))
-            && group_of(pair.a) != group_of(pair.b)
+        pair.verdict == PairVerdict::TooFewInliers && pair.agreeing >= options.matching.fewest_if_alike()
     };
-    let candidates: Vec<(usize, usize)> =
-        matches.pairs.iter().filter(is_in_question).map(|pair| (pair.a, pair.b)).collect();
-    if candidates.is_empty() || !input.wished.is_empty() {
+    let (usable, tried) = (usable(input, &matches.strangers), BTreeSet::new());
+    let apart = Apart { groups: &matches.graph.components, usable: &usable, wished: input.wished, tried: &tried };
+    let in_question = matches.pairs.iter().filter(is_in_question).map(|pair| (pair.a, pair.b));
+    let candidates: Vec<(usize, usize)> = in_question.filter(apart.is_apart()).collect();
+    if candidates.is_empty() {
         return Ok(matches);
     }
     let mut found = match_candidates(input, &candidates, Look::First, Demand::FewIfAlike, options, context)?;
