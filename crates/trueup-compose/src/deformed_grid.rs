@@ -283,6 +283,11 @@ impl Cell {
         (found, count)
     }
 
+    /// The rows of the photograph between which the cell lies: its top and its bottom.
+    pub(crate) fn source_rows(&self) -> [f64; 2] {
+        [self.source[1], self.source[1] + self.source_size[1]]
+    }
+
     /// The inverse of the cell's bilinear map along canvas row `y`.
     pub(crate) fn inverse_along_row(&self, y: usize) -> InverseBilinear {
         InverseBilinear::new(self.corners.map(Into::into), self.source, self.source_size, y as f64 + 0.5)

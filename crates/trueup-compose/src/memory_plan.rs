@@ -41,8 +41,14 @@ pub(crate) struct MemoryPlan {
     pub(crate) photographs: usize,
     /// The same where one place shows so many that fewer will not do.
     pub(crate) most_photographs: usize,
+    /// Whether of a photograph only those rows are held that what is worked at shows. It is decoded again for others.
+    pub(crate) in_parts: bool,
+    /// Bytes of decoded photographs that may be kept from when they are made small until the canvas is finished.
+    pub(crate) kept: usize,
     /// Photographs decoded at once.
     pub(crate) at_a_time: usize,
+    /// Photographs whose coarse levels are blended at once.
+    pub(crate) levels_at_a_time: usize,
     /// Bytes of the canvas that may be summed up at once, where photographs are averaged.
     sums: usize,
 }
@@ -63,7 +69,9 @@ impl MemoryPlan {
     /// # Errors
     /// [`Error::Limits`] with the numbers if there is too little memory or too little room on the disk.
     pub(crate) fn new(needs: &MemoryNeeds, allowed: &Allowed<'_>) -> Result<Self> {
-        let least = needs.least();
+        // Whole photographs are held where that is allowed at all: of parts, most are decoded several times.
+        let parts = needs.in_parts.filter(|_| needs.least_whole() > allowed.ceiling);
+        let least = if parts.is_some() { needs.least() } else { needs.least_whole() };
         if least > allowed.ceiling {
             return Err(needs.refusal(allowed.ceiling));
         }
@@ -80,7 +88,7 @@ impl MemoryPlan {
         let hold_levels = work.coarse_levels <= left / 4;
         let left = left - if hold_levels { work.coarse_levels } else { 0 };
         let threads = rayon::current_num_threads().max(1);
-        let one = DECODING * needs.largest;
+        let one = decoding_bytes(needs.largest);
         // A quarter of the rest for further photographs at once; the first is counted in what is needed at least.
         let more = (left / 4).checked_div(one).unwrap_or(threads).min(threads - 1);
         let left = left - more * one;
@@ -96,8 +104,15 @@ impl MemoryPlan {
             file.write_at(&[0], on_disk - 1)?;
         }
         let place = file.clone().map(|file| SpillPlace { file, offset: on_disk });
-        let photographs = needs.at_one_place.saturating_add(left);
+        let photographs = parts.map_or(needs.at_one_place, |parts| parts.photographs).saturating_add(left);
+        let levels_at_a_time = match parts {
+            None => threads,
+            Some(parts) => 1 + left.checked_div(parts.levels_of_one).unwrap_or(threads).min(threads - 1),
+        };
         Ok(Self {
+            in_parts: parts.is_some(),
+            kept: if parts.is_some() { 0 } else { photographs },
+            levels_at_a_time,
             coarse_levels: place.filter(|_| !hold_levels),
             file: file.filter(|_| !in_memory),
             photographs,
@@ -126,10 +141,19 @@ impl MemoryPlan {
     }
 }
 
-fn photograph_bytes(placed: &Placed, source: &dyn PhotographSource) -> usize {
-    // The cast saturates.
-    let pixels = (placed.mesh.width * placed.mesh.height) as usize;
-    source.bytes(placed.photograph).unwrap_or(pixels.saturating_mul(UNKNOWN_PIXEL_BYTES))
+/// Bytes of each photograph of a layout.
+pub(crate) fn photograph_bytes(layout: &CanvasLayout, source: &dyn PhotographSource) -> Vec<usize> {
+    let bytes = |placed: &Placed| {
+        // The cast saturates.
+        let pixels = (placed.mesh.width * placed.mesh.height) as usize;
+        source.bytes(placed.photograph).unwrap_or(pixels.saturating_mul(UNKNOWN_PIXEL_BYTES))
+    };
+    layout.placed.iter().map(bytes).collect()
+}
+
+/// Bytes that decoding a photograph of so many takes.
+pub(crate) fn decoding_bytes(photograph: usize) -> usize {
+    DECODING.saturating_mul(photograph)
 }
 
 /// Bytes that a way of composing takes beside the photographs.
@@ -145,6 +169,31 @@ pub(crate) struct WorkBytes {
     pub(crate) band: usize,
 }
 
+/// Bytes that composing along seams takes where photographs are held in parts, one is decoded at a time, and nothing is
+/// kept from one step to the next that can be had again: in each step, with what earlier ones left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct PartsBytes {
+    /// A photograph is decoded and made small, beside the small views of all others.
+    pub(crate) making_small: usize,
+    /// Seams are sought.
+    pub(crate) seams: usize,
+    /// Coarse levels are blended, one photograph's at a time.
+    pub(crate) coarse: usize,
+    /// What a further photograph's coarse levels take.
+    pub(crate) levels_of_one: usize,
+    /// Tiles are finished: what all of them need, and either the tiles or a photograph that is decoded.
+    pub(crate) finishing: usize,
+    /// Rows of photographs that one tile is made of, at most.
+    pub(crate) photographs: usize,
+}
+
+impl PartsBytes {
+    fn least(&self) -> usize {
+        let finishing = self.finishing.saturating_add(self.photographs);
+        self.making_small.max(self.seams).max(self.coarse).max(finishing)
+    }
+}
+
 /// Bytes that composing takes.
 #[derive(Debug)]
 pub(crate) struct MemoryNeeds {
@@ -155,16 +204,23 @@ pub(crate) struct MemoryNeeds {
     largest: usize,
     /// Of the largest photographs, as many as may be wanted at one place.
     at_one_place: usize,
+    /// What it takes with photographs in parts, if they may be.
+    in_parts: Option<PartsBytes>,
 }
 
 impl MemoryNeeds {
-    /// For the photographs of `layout`, composed in a way that takes `work`.
-    pub(crate) fn new(layout: &CanvasLayout, source: &dyn PhotographSource, work: WorkBytes) -> Self {
-        let mut bytes: Vec<usize> = layout.placed.iter().map(|placed| photograph_bytes(placed, source)).collect();
+    /// For the photographs of `layout`, of so many `bytes` each, composed in a way that takes `work`, or `in_parts` if
+    /// that may be.
+    pub(crate) fn new(
+        layout: &CanvasLayout,
+        mut bytes: Vec<usize>,
+        work: WorkBytes,
+        in_parts: Option<PartsBytes>,
+    ) -> Self {
         bytes.sort_unstable_by(|a, b| b.cmp(a));
         let largest = bytes.first().copied().unwrap_or(0);
         let at_one_place = bytes.iter().take(AT_ONE_PLACE).sum();
-        Self { size: [layout.width, layout.height], work, largest, at_one_place }
+        Self { size: [layout.width, layout.height], work, largest, at_one_place, in_parts }
     }
 
     /// Where neither the canvas nor all of the photographs' own levels are held: others have them.
@@ -178,24 +234,26 @@ impl MemoryNeeds {
     }
 
     /// With the canvas and the photographs' own levels on disk, and one photograph decoded at a time.
-    pub(crate) fn least(&self) -> usize {
-        [self.work.working, self.work.band, self.at_one_place, DECODING * self.largest]
+    pub(crate) fn least_whole(&self) -> usize {
+        [self.work.working, self.work.band, self.at_one_place, decoding_bytes(self.largest)]
             .iter()
             .fold(0, |sum, &one| sum.saturating_add(one))
     }
 
+    /// The same, with photographs in parts where they may be and that is less.
+    pub(crate) fn least(&self) -> usize {
+        self.in_parts.map_or(usize::MAX, |parts| parts.least()).min(self.least_whole())
+    }
+
     fn refusal(&self, allowed: usize) -> Error {
-        let photographs = self.at_one_place.saturating_add(DECODING * self.largest);
         let words = |bytes: usize| needed_in_words(bytes as u64);
         let [width, height] = self.size;
         Error::Limits {
             subject: format!("composing {width} x {height} px"),
             needed: format!(
-                "at least {} of memory ({} for photographs of up to {}, {} for seams and blending)",
+                "at least {} of memory for photographs of up to {}, their seams and blending",
                 words(self.least()),
-                words(photographs),
                 words(self.largest),
-                words(self.least() - photographs)
             ),
             allowed: room_in_words(allowed as u64),
             hint: "Raise --memory (resources.memory) by the difference, or make a smaller panorama (--scale)."

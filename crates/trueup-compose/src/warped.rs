@@ -53,8 +53,12 @@ impl Resampling {
 
 /// A decoded photograph with its grid, feather and correction.
 pub(crate) struct WarpedPhotograph<'a> {
-    /// Reduced as far as the canvas allows.
+    /// Reduced as far as the canvas allows; maybe some of its rows only.
     photograph: Cow<'a, Photograph>,
+    /// Rows of it above the first that there is.
+    rows_above: usize,
+    /// So many rows of the photograph became one.
+    reduced_by: f64,
     /// In the reduced photograph's pixels.
     grid: DeformedGrid,
     feather: Feather,
@@ -105,6 +109,7 @@ impl<'a> WarpedPhotograph<'a> {
         resampling: &Resampling,
     ) -> Self {
         let grid_of = |mesh: &GridMesh| DeformedGrid::new(mesh, 1.0, true, size[0], size[1]);
+        let whole_height = mesh.height;
         let mut grid = grid_of(mesh);
         let halvings = halvings_before_sampling(&grid, resampling.minification_threshold);
         if halvings > 0 {
@@ -124,7 +129,17 @@ impl<'a> WarpedPhotograph<'a> {
         let feather = Feather::new(grid.size, FEATHER_EXPONENT);
         let local = light.local.cloned();
         let light = LightTable::new(light, grid.size);
-        Self { photograph, grid, feather, light, local, ignored: None, is_fitted }
+        let reduced_by = whole_height / grid.size[1];
+        Self { photograph, rows_above: 0, reduced_by, grid, feather, light, local, ignored: None, is_fitted }
+    }
+
+    /// The same with no more of the photograph than some of its `rows`, of those that it had before it was reduced:
+    /// where it is sampled, it is to be sampled within these.
+    pub(crate) fn with_rows_only(self, rows: &Range<usize>) -> Self {
+        let start = (rows.start as f64 / self.reduced_by).floor() as usize;
+        let end = (rows.end as f64 / self.reduced_by).ceil() as usize;
+        let photograph = Cow::Owned(self.photograph.some_rows(start..end));
+        Self { photograph, rows_above: start, ..self }
     }
 
     /// The same without what is not to be seen of it.
@@ -137,6 +152,8 @@ impl<'a> WarpedPhotograph<'a> {
     pub(crate) fn with_spread_highlights(&self) -> WarpedPhotograph<'_> {
         WarpedPhotograph {
             photograph: Cow::Borrowed(&self.photograph),
+            rows_above: self.rows_above,
+            reduced_by: self.reduced_by,
             grid: self.grid.clone(),
             feather: self.feather.clone(),
             light: self.light.clone().with_whole_shoulder(),
@@ -151,7 +168,7 @@ impl<'a> WarpedPhotograph<'a> {
         &self.grid
     }
 
-    /// The photograph as it is sampled, maybe reduced, and its exact size.
+    /// The photograph as it is sampled, maybe reduced, and its exact size. There may be some of its rows only.
     pub(crate) fn photograph(&self) -> (&Photograph, [f64; 2]) {
         (&self.photograph, self.grid.size)
     }
@@ -313,12 +330,14 @@ impl<'a> WarpedPhotograph<'a> {
         invert_row(&cell.inverse_along_row(y), run.columns.start, positions);
         let threshold = if self.is_fitted { FITTED_THRESHOLD } else { resampling.minification_threshold };
         let stretch = cell.footprint.map(|pixels| (pixels / threshold).clamp(1.0, MAX_STRETCH));
+        positions.move_up(self.rows_above);
         match resampling.interpolation {
             Interpolation::Bilinear => {
                 interpolate::<Bilinear>(&self.photograph, positions, stretch, samples, at_border)
             }
             Interpolation::Bicubic => interpolate::<Bicubic>(&self.photograph, positions, stretch, samples, at_border),
         }
+        positions.move_down(self.rows_above);
         if let Some(ignored) = &self.ignored {
             for (index, (x, sample)) in run.columns.clone().zip(samples).enumerate() {
                 if ignored.hides(positions.place(index), self.grid.size, [x, y]) {

@@ -1,5 +1,7 @@
 //! Pixels in memory: interleaved channels, rows from top to bottom.
 
+use std::ops::Range;
+
 use crate::error::{Error, Result};
 
 /// Rec. 601 luma weights of red, green and blue, applied to encoded values.
@@ -102,6 +104,16 @@ impl<T: Copy + Default> Raster<T> {
     }
 }
 
+impl<T: Copy> Raster<T> {
+    /// See [`Photograph::some_rows`].
+    fn some_rows(&self, rows: Range<usize>) -> Self {
+        let end = rows.end.min(self.height);
+        let start = rows.start.min(end);
+        let samples = self.width * self.channels;
+        Self { height: end - start, data: self.data[start * samples..end * samples].to_vec(), ..*self }
+    }
+}
+
 impl<T: Copy + PartialEq> Raster<T> {
     /// See [`Photograph::without_full_alpha`]; `full` is what is opaque.
     fn without_full_alpha(mut self, full: T) -> Self {
@@ -183,6 +195,15 @@ impl Photograph {
         match self {
             Self::Eight(raster) => raster.channels(),
             Self::Sixteen(raster) => raster.channels(),
+        }
+    }
+
+    /// A copy of some of its rows, as far as it has them.
+    #[must_use]
+    pub fn some_rows(&self, rows: Range<usize>) -> Self {
+        match self {
+            Self::Eight(raster) => Self::Eight(raster.some_rows(rows)),
+            Self::Sixteen(raster) => Self::Sixteen(raster.some_rows(rows)),
         }
     }
 }
@@ -271,6 +292,18 @@ mod tests {
         assert_eq!(eight, [1, 2, 3, 255, 0, 255, 7, 255]);
         assert_eq!(sixteen, [257, 514, 771, 65535, 0, 65535, 1799, 65535]);
         assert!(picture.linear_row(0, &mut [0.0; 8]).is_err());
+    }
+
+    #[test]
+    fn some_rows_are_those_that_there_are() {
+        let photograph = Photograph::Sixteen(Raster::from_data(2, 3, 1, vec![0, 1, 10, 11, 20, 21]).expect("samples"));
+        let rows = |rows: Range<usize>| match photograph.some_rows(rows) {
+            Photograph::Sixteen(raster) => (raster.width(), raster.height(), raster.channels(), raster.into_data()),
+            Photograph::Eight(_) => panic!("of its own depth"),
+        };
+        assert_eq!(rows(1..2), (2, 1, 1, vec![10, 11]));
+        assert_eq!(rows(1..9), (2, 2, 1, vec![10, 11, 20, 21]));
+        assert_eq!(rows(7..9), (2, 0, 1, vec![]));
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub(super) struct CoarseBlend<'a> {
     pub(super) own: &'a CoarseLevels,
     pub(super) shown: ShownWhere<'a>,
     pub(super) levels: WholeLevels,
+    /// Photographs whose levels are in memory at once.
+    pub(super) at_a_time: usize,
 }
 
 impl CoarseBlend<'_> {
@@ -59,7 +61,7 @@ impl CoarseBlend<'_> {
             let mask = self.mask(&level, placement);
             Ok((level, mask))
         };
-        in_order(self.own.len(), masked, |(level, mask): (_, CountedMask)| {
+        in_order(self.own.len(), self.at_a_time, masked, |(level, mask): (_, CountedMask)| {
             let over = mask.over(&level.plane);
             add_base(&mut cut, &level.plane, &over);
             shown.set(masks.len() as Label, &over);
@@ -85,7 +87,7 @@ impl CoarseBlend<'_> {
             take_out(&mut level.plane, &Beside { cut, shown, mask: &mask, levels: self.levels.above + 1 });
             Ok(pyramid(level, mask, self.levels.above))
         };
-        in_order(self.own.len(), differences, |pyramid: WeightedLevels| {
+        in_order(self.own.len(), self.at_a_time, differences, |pyramid: WeightedLevels| {
             sums.par_iter_mut().enumerate().for_each(|(level, sum)| {
                 let (own, weights) = &pyramid[level];
                 match pyramid.get(level + 1) {
@@ -161,9 +163,14 @@ impl CountedMask {
     }
 }
 
-/// Makes something of each of `count` photographs, as many at a time as there are threads, and uses them in order.
-fn in_order<T: Send>(count: usize, make: impl Fn(usize) -> Result<T> + Sync, mut take: impl FnMut(T)) -> Result<()> {
-    let at_a_time = rayon::current_num_threads().max(1);
+/// Makes something of each of `count` photographs, so many `at_a_time`, and uses them in order.
+fn in_order<T: Send>(
+    count: usize,
+    at_a_time: usize,
+    make: impl Fn(usize) -> Result<T> + Sync,
+    mut take: impl FnMut(T),
+) -> Result<()> {
+    let at_a_time = at_a_time.max(1);
     for first in (0..count).step_by(at_a_time) {
         let made: Vec<T> = (first..(first + at_a_time).min(count)).into_par_iter().map(&make).collect::<Result<_>>()?;
         made.into_iter().for_each(&mut take);

@@ -14,6 +14,7 @@ mod levels;
 mod loaded;
 mod needs;
 mod order;
+mod parts;
 mod region;
 mod shown;
 #[cfg(test)]
@@ -42,6 +43,7 @@ use crate::small_views::{CoarseLevels, DecodedPhotographs, small_size};
 use crate::store::{Block, PixelStore, RootPixel};
 use crate::warped::{Resampling, SamplingMemory};
 use loaded::{LoadedPhotographs, PhotographLoader};
+use parts::HeldPhotographs;
 use region::FinishedTile;
 use shown::ShownWhere;
 use tile::BlendTile;
@@ -83,11 +85,14 @@ impl<'a> Blending<'a> {
     /// # Errors
     /// Those of a scratch file.
     pub(crate) fn new(mut input: BlendInput<'a>) -> Result<Self> {
-        let BlendInput { unrolled, photographs, resampling, seams, .. } = input;
+        let BlendInput { unrolled, photographs, resampling, seams, plan, .. } = input;
         let first_level = first_level(unrolled.finished());
         let shown = ShownWhere { unrolled, seams };
         let coarse_levels = std::mem::take(&mut input.coarse_levels);
-        let levels = input.levels.map(|levels| BlendedLevels::new(coarse_levels, shown, levels)).transpose()?;
+        let levels = input
+            .levels
+            .map(|levels| BlendedLevels::new(coarse_levels, shown, levels, plan.levels_at_a_time))
+            .transpose()?;
         let ignored = unrolled.placed().iter().map(|placed| photographs.masks(placed.photograph).ignored).collect();
         Ok(Self { input, work: BlendWork { resampling, shown, first_level, levels, ignored } })
     }
@@ -144,20 +149,20 @@ impl<'a> Blending<'a> {
         let Self { input, work } = &self;
         let BlendInput { unrolled, seams, .. } = input;
         let mut pixels = self.canvas();
-        let bytes = self.placement_bytes();
+        let whole = HeldPhotographs::whole(unrolled, self.placement_bytes());
         let regions = order::regions(unrolled, work.first_level, parts);
         let common = RegionWork {
             seams: (*seams).clone(),
             blended: work.levels.as_ref().map(|levels| levels.blended.clone()),
             bytes: input.decoded.bytes.clone(),
         };
-        let mut counted = vec![false; bytes.len()];
+        let mut counted = vec![false; unrolled.placed().len()];
         let mut done = vec![false; regions.len()];
         let region = |number: usize| {
             context.check_cancelled()?;
             let parts = &regions[number];
-            let batches = order::batches(work, parts, &bytes, order::Room::UNLIMITED)?;
-            let shown: BTreeSet<Label> = batches.into_iter().flat_map(|batch| batch.shown).collect();
+            let batches = order::batches(work, parts, &whole, order::Room::UNLIMITED)?;
+            let shown: BTreeSet<Label> = batches.into_iter().flat_map(|batch| batch.shown.into_keys()).collect();
             let own = |&label: &Label| {
                 let at = usize::from(label);
                 Ok((at, work.levels.as_ref().map(|levels| levels.own.ready(at)).transpose()?.unwrap_or_default()))
@@ -207,22 +212,23 @@ impl<'a> Blending<'a> {
 
     /// [`Self::finish`], onto what takes the tiles.
     fn finish_each(self, parts: &[Rectangle], onto: &mut dyn TakesTiles, context: &StageContext) -> Result<()> {
-        let bytes = self.placement_bytes();
+        let held = HeldPhotographs::whole(self.input.unrolled, self.placement_bytes());
         let Self { input, mut work } = self;
         let BlendInput { unrolled, corrections, photographs, resampling, plan, .. } = input;
+        let held = if plan.in_parts { held.in_parts(unrolled) } else { held };
         let placements = unrolled.placed().len();
         let mut kept = input.decoded.kept;
         // Of several placements, the first takes what was kept.
         let kept = (0..placements).map(|at| kept[unrolled.original(at)].take()).collect();
         let room = order::Room { usual: plan.photographs, most: plan.most_photographs };
-        let batches = order::batches(&work, parts, &bytes, room)?;
+        let batches = order::batches(&work, parts, &held, room)?;
         let curve = photographs.transfer_curve();
         let local = input.local.map(|local| local.led_by(unrolled.lead()));
         let local = local.as_ref();
         let loader = PhotographLoader { unrolled, curve: &curve, corrections, local, photographs, resampling, context };
         let mut loaded = LoadedPhotographs::new(loader, kept, &batches, plan.photographs, plan.at_a_time);
         for (index, batch) in batches.iter().enumerate() {
-            loaded.prepare(index, batch, &bytes)?;
+            loaded.prepare(index, batch, &held)?;
             if let Some(levels) = &mut work.levels {
                 levels.own.hold(|at| loaded.warped()[at].is_some())?;
             }
@@ -373,9 +379,9 @@ pub(crate) fn finish_region(
         plan,
     };
     let blending = Blending { input, work };
-    let placement_bytes = blending.placement_bytes();
-    let batches = order::batches(&blending.work, &parts, &placement_bytes, order::Room::UNLIMITED)?;
-    if !batches.iter().flat_map(|batch| &batch.shown).all(|&label| has_own.contains(&usize::from(label))) {
+    let whole = HeldPhotographs::whole(unrolled, blending.placement_bytes());
+    let batches = order::batches(&blending.work, &parts, &whole, order::Room::UNLIMITED)?;
+    if !batches.iter().flat_map(|batch| batch.shown.keys()).all(|&label| has_own.contains(&usize::from(label))) {
         return Err(not_asked_for());
     }
     let mut tiles = Vec::new();

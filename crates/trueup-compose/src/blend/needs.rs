@@ -1,9 +1,10 @@
 //! How much memory blending takes, before there is anything to blend.
 
 use super::levels::WholeLevels;
+use super::parts::most_of_a_tile;
 use super::work::TILES_AT_ONCE;
 use crate::layout::Unrolled;
-use crate::memory_plan::WorkBytes;
+use crate::memory_plan::{PartsBytes, WorkBytes, decoding_bytes};
 use crate::pyramid::{first_level, mask_margin, tile_side};
 use crate::small_views::{RIM, SAMPLE_BYTES, small_size};
 use crate::store::{Pixel, RootPixel};
@@ -20,9 +21,13 @@ const COARSE_COPIES: f64 = 8.0;
 /// A tile's photograph, sums, masks and interpolated levels, in pictures of the tile with its margin.
 const TILE_COPIES: f64 = 8.0;
 
-/// Bytes that the photographs of `unrolled` take to be made small, cut along seams and, if there are any coarse
-/// `levels`, blended.
-pub(crate) fn needed_bytes(unrolled: &Unrolled<'_>, levels: Option<WholeLevels>) -> WorkBytes {
+/// Bytes that the photographs of `unrolled`, of so many `bytes` each, take to be made small, cut along seams and, if
+/// there are any coarse `levels`, blended; and what that takes where they are held in parts.
+pub(crate) fn needed_bytes(
+    unrolled: &Unrolled<'_>,
+    levels: Option<WholeLevels>,
+    bytes: &[usize],
+) -> (WorkBytes, PartsBytes) {
     let layout = unrolled.original_layout();
     let several = layout.placed.len() > 1;
     let first_level = first_level([layout.width, layout.height]);
@@ -51,14 +56,36 @@ pub(crate) fn needed_bytes(unrolled: &Unrolled<'_>, levels: Option<WholeLevels>)
     // The level cut along the seams, sums at all levels and what one of them is interpolated to, beside some
     // photographs' own levels, and a byte for each sample of all: how much of it is shown.
     let masks: f64 = own_levels.iter().sum();
-    let coarse = sample * (whole * (1.0 + 4.0 / 3.0 + 1.0) + threads * COARSE_COPIES * largest(&own_levels)) + masks;
+    let levels_of_one = if levels.is_none() { 0.0 } else { sample * COARSE_COPIES * largest(&own_levels) };
+    let coarse = |at_once: f64| match levels {
+        None => 0.0,
+        Some(_) => sample * (whole * (1.0 + 4.0 / 3.0 + 1.0)) + at_once * levels_of_one + masks,
+    };
     let side = (tile_side(first_level) + 2 * mask_margin(first_level)) as f64;
     // Those that are put on the canvas, and the next ones.
     let finished = (2 * TILES_AT_ONCE * RootPixel::BYTES) as f64 * (tile_side(first_level) as f64).powi(2);
-    let tiles = sample * whole + threads * (sample * TILE_COPIES * side * side + finished);
-    let coarse = if levels.is_none() { 0.0 } else { coarse };
-    let working = if several { searching.max(coarse).max(tiles) } else { tiles - sample * whole };
+    let busy_tiles = threads * (sample * TILE_COPIES * side * side + finished);
+    let blended = if several { sample * whole } else { 0.0 };
+    let tiles = blended + busy_tiles;
+    let working = if several { searching.max(coarse(threads)).max(tiles) } else { tiles };
     let own_levels = if levels.is_none() { 0.0 } else { sample * own_levels.iter().sum::<f64>() };
+    let photograph = bytes.iter().copied().max().unwrap_or(0);
+    let decoding = decoding_bytes(photograph);
     // The casts saturate.
-    WorkBytes { pixel_bytes: RootPixel::BYTES, working: working as usize, coarse_levels: own_levels as usize, band: 0 }
+    let parts = PartsBytes {
+        making_small: (SEARCH_VIEW * views.iter().sum::<f64>()) as usize
+            + decoding.max(photograph.saturating_add(levels_of_one as usize)),
+        seams: if several { searching as usize } else { 0 },
+        coarse: coarse(1.0) as usize,
+        levels_of_one: levels_of_one as usize,
+        finishing: blended as usize + (busy_tiles as usize).max(decoding),
+        photographs: most_of_a_tile(unrolled, first_level, bytes),
+    };
+    let work = WorkBytes {
+        pixel_bytes: RootPixel::BYTES,
+        working: working as usize,
+        coarse_levels: own_levels as usize,
+        band: 0,
+    };
+    (work, parts)
 }

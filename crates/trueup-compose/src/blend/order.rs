@@ -6,22 +6,26 @@ use rayon::prelude::*;
 use trueup_core::memory::{needed_in_words, room_in_words};
 use trueup_core::{Error, Result};
 
-use super::tile::BlendTile;
+use super::parts::{HeldPhotographs, WantedRows, join};
+use super::tile::{BlendTile, sampled_window};
 use super::work::BlendWork;
 use crate::coverage::Rectangle;
-use crate::label::Label;
 use crate::layout::Unrolled;
 use crate::pyramid::tile_side;
-use crate::window::common;
+use crate::window::{Window, common};
 
 /// Canvas pixels across a strip: enough tiles for all threads, few enough photographs.
 const STRIP: usize = 512;
+
+/// The same where photographs are held in parts: the thicker strips are, the fewer want a photograph, and the more of it
+/// each.
+const PARTS_STRIPS: [usize; 4] = [512, 1024, 2048, 4096];
 
 /// Tiles that are finished one after the other, and the photographs they are made of.
 #[derive(Debug)]
 pub(super) struct Batch {
     pub(super) tiles: Vec<BlendTile>,
-    pub(super) shown: Vec<Label>,
+    pub(super) shown: WantedRows,
 }
 
 /// Bytes for the photographs of a batch.
@@ -38,12 +42,18 @@ impl Room {
     pub(super) const UNLIMITED: Self = Self { usual: usize::MAX, most: usize::MAX };
 }
 
-/// The tiles of all `parts` of the canvas in batches whose photographs, of these sizes in `bytes`, have `room`.
-/// Strips run across that side of the canvas which leaves fewer photographs in memory from one strip to the next.
+/// The tiles of all `parts` of the canvas in batches for which what is `held` of the photographs has `room`.
+/// Strips run across that side of the canvas which leaves fewer photographs in memory from one strip to the next; of
+/// photographs in parts, those in which fewer are decoded.
 ///
 /// # Errors
 /// [`Error::Limits`] if a single tile is made of more.
-pub(super) fn batches(work: &BlendWork<'_>, parts: &[Rectangle], bytes: &[usize], room: Room) -> Result<Vec<Batch>> {
+pub(super) fn batches(
+    work: &BlendWork<'_>,
+    parts: &[Rectangle],
+    held: &HeldPhotographs,
+    room: Room,
+) -> Result<Vec<Batch>> {
     let [width, height] = work.shown.unrolled.finished();
     let side = tile_side(work.first_level);
     let cut = |first: usize, length: usize| -> Vec<Range<usize>> {
@@ -67,15 +77,34 @@ pub(super) fn batches(work: &BlendWork<'_>, parts: &[Rectangle], bytes: &[usize]
         let wanted = |strip: Vec<usize>| strip.into_iter().filter(|&at| wanted[at]).collect();
         strips.into_iter().map(wanted).collect()
     };
-    let along_x = of_wanted(strips(columns.len(), rows.len(), side, |along, across| across * columns.len() + along));
-    let along_y = of_wanted(strips(rows.len(), columns.len(), side, |along, across| along * columns.len() + across));
-    let (x, y) = (most_alive(&along_x, &tiles, bytes), most_alive(&along_y, &tiles, bytes));
-    let strips = if x < y || x == y && width >= height { along_x } else { along_y };
-    let mut batches = Vec::new();
-    for strip in strips {
-        split(&strip, &tiles, bytes, room, &mut batches)?;
+    let along_x = |thick: usize| {
+        of_wanted(strips(columns.len(), rows.len(), thick / side, |along, across| across * columns.len() + along))
+    };
+    let along_y = |thick: usize| {
+        of_wanted(strips(rows.len(), columns.len(), thick / side, |along, across| along * columns.len() + across))
+    };
+    let wanted = |at: usize| {
+        let tile = [&tiles[at].columns, &tiles[at].rows];
+        let (columns, rows) = sampled_window(tile, work.first_level, work.shown.unrolled);
+        held.wanted(&tiles[at].shown, Window { columns: &columns, rows: &rows })
+    };
+    let in_batches = |strips: Vec<Vec<usize>>| -> Result<Vec<Batch>> {
+        let mut batches = Vec::new();
+        for strip in strips {
+            let strip = strip.into_iter().map(|at| (&tiles[at], wanted(at)));
+            split(strip, |wanted| held.size(wanted), room, &mut batches)?;
+        }
+        Ok(batches)
+    };
+    if held.is_in_parts() {
+        // Other strips want other rows: what counts is how often photographs are decoded.
+        let each = PARTS_STRIPS.into_iter().flat_map(|thick| [in_batches(along_y(thick)), in_batches(along_x(thick))]);
+        let decoded = |batches: &Vec<Batch>| batches.iter().map(|batch| batch.shown.len()).sum::<usize>();
+        return Ok(each.collect::<Result<Vec<_>>>()?.into_iter().min_by_key(decoded).unwrap_or_default());
     }
-    Ok(batches)
+    let (along_x, along_y) = (along_x(STRIP), along_y(STRIP));
+    let (x, y) = (most_alive(&along_x, &tiles, held.bytes()), most_alive(&along_y, &tiles, held.bytes()));
+    in_batches(if x < y || x == y && width >= height { along_x } else { along_y })
 }
 
 /// Sides of a region, in photographs: of a larger one more is lost with a computer that fails, of a smaller one more
@@ -103,9 +132,9 @@ pub(super) fn regions(unrolled: &Unrolled<'_>, first_level: u32, parts: &[Rectan
     places.map(|(top, left)| within(top, left)).filter(|parts| !parts.is_empty()).collect()
 }
 
-/// Indices of the tiles of every strip; within a strip, those that lie side by side across it follow each other.
-fn strips(along: usize, across: usize, side: usize, index: impl Fn(usize, usize) -> usize) -> Vec<Vec<usize>> {
-    let thick = (STRIP / side).max(1);
+/// Indices of the tiles of every strip, so many tiles `thick`; within a strip, those that lie side by side across it follow each other.
+fn strips(along: usize, across: usize, thick: usize, index: impl Fn(usize, usize) -> usize) -> Vec<Vec<usize>> {
+    let thick = thick.max(1);
     (0..along)
         .step_by(thick)
         .map(|start| {
@@ -138,17 +167,21 @@ fn most_alive(strips: &[Vec<usize>], tiles: &[BlendTile], bytes: &[usize]) -> us
         .unwrap_or(0)
 }
 
-/// Adds the tiles of a strip in as few batches as the room allows.
-fn split(strip: &[usize], tiles: &[BlendTile], bytes: &[usize], room: Room, batches: &mut Vec<Batch>) -> Result<()> {
-    let mut batch = Batch { tiles: Vec::new(), shown: Vec::new() };
-    for tile in strip.iter().map(|&at| &tiles[at]) {
-        let own: Vec<Label> = tile.shown.iter().copied().filter(|&label| usize::from(label) < bytes.len()).collect();
-        let size = |labels: &[Label]| labels.iter().map(|&label| bytes[usize::from(label)]).sum::<usize>();
+/// Adds the tiles of a strip, with what each wants of photographs, in as few batches as there is room for what they
+/// want, of which `size` says how much it is.
+fn split<'a>(
+    strip: impl Iterator<Item = (&'a BlendTile, WantedRows)>,
+    size: impl Fn(&WantedRows) -> usize,
+    room: Room,
+    batches: &mut Vec<Batch>,
+) -> Result<()> {
+    let mut batch = Batch { tiles: Vec::new(), shown: WantedRows::new() };
+    for (tile, own) in strip {
         if size(&own) > room.most {
             return Err(too_many(own.len(), size(&own), room.most));
         }
         let mut joined = batch.shown.clone();
-        joined.extend(own.iter().filter(|label| !batch.shown.contains(label)));
+        join(&mut joined, &own);
         if size(&joined) > room.usual && !batch.tiles.is_empty() {
             batches.push(std::mem::replace(&mut batch, Batch { tiles: Vec::new(), shown: own }));
         } else {
@@ -157,9 +190,6 @@ fn split(strip: &[usize], tiles: &[BlendTile], bytes: &[usize], room: Room, batc
         batch.tiles.push(tile.clone());
     }
     batches.push(batch);
-    for batch in batches {
-        batch.shown.sort_unstable();
-    }
     Ok(())
 }
 
@@ -176,6 +206,7 @@ fn too_many(count: usize, needed: usize, room: usize) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::label::Label;
 
     /// Photographs of 10 bytes each. Of three tiles that show two, the first and the second have one in common; a
     /// fourth shows three.
@@ -184,9 +215,11 @@ mod tests {
         let tile = |shown: &[Label]| BlendTile { columns: 0..1, rows: 0..1, shown: shown.to_vec() };
         let tiles = [tile(&[0, 1]), tile(&[1, 2]), tile(&[3, 4]), tile(&[2, 3, 4])];
         let shown = |room: Room| -> Option<Vec<Vec<Label>>> {
+            let whole = |tile: &BlendTile| tile.shown.iter().map(|&label| (label, 0..5)).collect();
+            let strip = tiles.iter().map(|tile| (tile, whole(tile)));
             let mut batches = Vec::new();
-            split(&[0, 1, 2, 3], &tiles, &[10; 5], room, &mut batches).ok()?;
-            Some(batches.into_iter().map(|batch| batch.shown).collect())
+            split(strip, |wanted| 10 * wanted.len(), room, &mut batches).ok()?;
+            Some(batches.into_iter().map(|batch| batch.shown.into_keys().collect()).collect())
         };
         let all = |shown: &[&[Label]]| Some(shown.iter().map(|labels| labels.to_vec()).collect());
         assert_eq!(shown(Room::UNLIMITED), all(&[&[0, 1, 2, 3, 4]]));

@@ -12,7 +12,7 @@ use super::*;
 use crate::label::Label;
 use crate::layout::{CanvasLayout, Placed};
 use crate::light::{Corrections, PhotographLight};
-use crate::memory_plan::MemoryNeeds;
+use crate::memory_plan::{MemoryNeeds, photograph_bytes};
 use crate::render::test_rendering::{compose, roots};
 use crate::render::{Blend, Interpolation, RenderOptions, Resources};
 use crate::seam::{self, SeamInput, SeamOptions};
@@ -196,7 +196,9 @@ fn with_work<T>(
     let memory = Memory(photographs.clone());
     let levels = WholeLevels { first_level, above: 2 };
     let unrolled = Unrolled::new(&layout, first_level, Some(levels.above)).expect("few");
-    let needs = MemoryNeeds::new(&layout, &memory, needed_bytes(&unrolled, Some(levels)));
+    let bytes = photograph_bytes(&layout, &memory);
+    let (needed, in_parts) = needed_bytes(&unrolled, Some(levels), &bytes);
+    let needs = MemoryNeeds::new(&layout, bytes, needed, Some(in_parts));
     let plan = MemoryPlan::new(&needs, &Resources::unlimited().allowed()).expect("no limit");
     let input = SmallViewsInput {
         unrolled: &unrolled,
@@ -213,7 +215,7 @@ fn with_work<T>(
     let seams = seam::run(&input, &SeamOptions::default(), &context).expect("seams");
     let shown = ShownWhere { unrolled: &unrolled, seams: &seams };
     let canvas = [layout.width, layout.height];
-    let levels = Some(BlendedLevels::new(small.coarse_levels, shown, levels).expect("in memory"));
+    let levels = Some(BlendedLevels::new(small.coarse_levels, shown, levels, 2).expect("in memory"));
     let ignored = vec![None; unrolled.placed().len()];
     let resampling = Resampling::of(Interpolation::Bicubic);
     let mut work = BlendWork { resampling, shown, first_level, levels, ignored };

@@ -8,6 +8,7 @@ use trueup_core::mask::Mask;
 use super::work::BlendWork;
 use crate::ignored::in_mask;
 use crate::label::{Label, NOBODY};
+use crate::layout::Unrolled;
 use crate::pyramid::{
     Expansion, LEAST_WEIGHT, PyramidPlane, add_detail, collapse, color, level_shares, mask_margin, tile_margin,
 };
@@ -18,9 +19,18 @@ use crate::warped::{RowSink, SamplingMemory, WarpedPhotograph};
 use crate::window::{Window, common, widened};
 
 /// A box with so many pixels more on all sides, cut at the canvas.
-fn grown([columns, rows]: [&Range<usize>; 2], margin: usize, work: &BlendWork<'_>) -> (Range<usize>, Range<usize>) {
-    let [width, height] = work.shown.unrolled.canvas();
+fn grown([columns, rows]: [&Range<usize>; 2], margin: usize, unrolled: &Unrolled<'_>) -> (Range<usize>, Range<usize>) {
+    let [width, height] = unrolled.canvas();
     (widened(columns, margin, width), widened(rows, margin, height))
+}
+
+/// What of the canvas is sampled for a tile: the tile, and what its fine levels are made of beside it.
+pub(super) fn sampled_window(
+    tile: [&Range<usize>; 2],
+    first_level: u32,
+    unrolled: &Unrolled<'_>,
+) -> (Range<usize>, Range<usize>) {
+    grown(tile, tile_margin(first_level), unrolled)
 }
 
 /// A part of the canvas; `columns` and `rows` start at multiples of 2^first_level.
@@ -41,7 +51,7 @@ impl BlendTile {
 
     /// What of the canvas decides which photographs a tile is made of: the tile and as much as its masks reach.
     fn with_margin(columns: &Range<usize>, rows: &Range<usize>, work: &BlendWork<'_>) -> (Range<usize>, Range<usize>) {
-        grown([columns, rows], mask_margin(work.first_level), work)
+        grown([columns, rows], mask_margin(work.first_level), work.shown.unrolled)
     }
 
     /// The finished pixels, row by row.
@@ -220,7 +230,7 @@ impl BlendTile {
         scratch: &mut SamplingMemory,
     ) -> Option<()> {
         let levels = work.levels.as_ref()?;
-        let (columns, rows) = grown([&self.columns, &self.rows], tile_margin(work.first_level), work);
+        let (columns, rows) = sampled_window([&self.columns, &self.rows], work.first_level, work.shown.unrolled);
         let mut sums = zero_levels(&columns, &rows, work.first_level);
         let mut opacity = vec![0.0_f32; self.columns.len() * self.rows.len()];
         let instead = match claim {

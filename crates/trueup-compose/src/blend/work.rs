@@ -24,9 +24,14 @@ pub(super) struct BlendedLevels {
 }
 
 impl BlendedLevels {
-    /// Blends what the photographs show `shown` where.
-    pub(super) fn new(mut own: CoarseLevels, shown: ShownWhere<'_>, levels: WholeLevels) -> Result<Self> {
-        let blended = CoarseBlend { own: &own, shown, levels }.blend()?;
+    /// Blends what the photographs show `shown` where, so many of them `at_a_time`.
+    pub(super) fn new(
+        mut own: CoarseLevels,
+        shown: ShownWhere<'_>,
+        levels: WholeLevels,
+        at_a_time: usize,
+    ) -> Result<Self> {
+        let blended = CoarseBlend { own: &own, shown, levels, at_a_time }.blend()?;
         own.level_all();
         Ok(Self { blended, own })
     }

@@ -37,7 +37,7 @@ use crate::crop::{CellsAhead, Frame, Framing};
 use crate::layout::{CanvasLayout, Unrolled};
 use crate::light::{ByResponse, Correction, LocalExposure};
 use crate::look;
-use crate::memory_plan::{MemoryNeeds, MemoryPlan};
+use crate::memory_plan::{MemoryNeeds, MemoryPlan, photograph_bytes};
 use crate::pyramid::first_level;
 use crate::render_options::{Composition, Transition};
 use crate::seam::{self, SeamInput, SeamOptions, Seams};
@@ -166,14 +166,16 @@ fn memory_needs(
     photographs: &dyn PhotographSource,
     options: &RenderOptions,
 ) -> Result<MemoryNeeds> {
-    let work = match composition(layout, options) {
+    let bytes = photograph_bytes(layout, photographs);
+    let (work, in_parts) = match composition(layout, options) {
         Composition::AlongSeams(_) => {
             let levels = whole_levels(layout, options);
-            blend::needed_bytes(&unrolled(layout, levels)?, levels)
+            let (work, in_parts) = blend::needed_bytes(&unrolled(layout, levels)?, levels, &bytes);
+            (work, Some(in_parts))
         }
-        Composition::Averaged(_) => average::needed_bytes(layout.width),
+        Composition::Averaged(_) => (average::needed_bytes(layout.width), None),
     };
-    Ok(MemoryNeeds::new(layout, photographs, work))
+    Ok(MemoryNeeds::new(layout, bytes, work, in_parts))
 }
 
 /// Photographs that are composed within a plan.

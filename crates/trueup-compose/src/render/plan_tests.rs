@@ -53,3 +53,29 @@ fn the_number_in_a_refusal_is_enough() {
         assert!(plan(least, least, blend).is_ok() && plan(least, least - 1, blend).is_err());
     }
 }
+
+/// Photographs are held as a whole wherever that is allowed, and in parts only where it is not: with as much as four of
+/// them and one that is decoded take beside the rest, they are, with a byte less they are not.
+#[test]
+fn photographs_are_in_parts_where_whole_ones_have_no_room() {
+    for blend in [Blend::MultiBand, Blend::None] {
+        let options = RenderOptions { blend, ..RenderOptions::default() };
+        let needs = || memory_needs(&layout(20), &Memory(Vec::new()), &options).expect("few photographs");
+        let free = plan(usize::MAX, usize::MAX, blend).expect("everything fits");
+        assert!(!free.in_parts && free.kept == free.photographs);
+        let whole = needs().least_whole();
+        let least = needs().least();
+        // Of six photographs of 48 MB that are counted, two stay, to decode one; rows of those that meet at a tile come.
+        assert!(least + 3 * 48_000_000 < whole, "{blend:?}: {least} of {whole}");
+        assert!(!plan(whole, whole, blend).expect("whole ones fit").in_parts);
+        for memory in [least, whole - 1] {
+            let parts = plan(memory, memory, blend).expect("parts fit");
+            assert!(parts.in_parts && parts.kept == 0 && parts.photographs < whole);
+        }
+    }
+    for blend in [Blend::Feather, Blend::Average] {
+        let options = RenderOptions { blend, ..RenderOptions::default() };
+        let needs = memory_needs(&layout(20), &Memory(Vec::new()), &options).expect("few photographs");
+        assert_eq!(needs.least(), needs.least_whole(), "{blend:?}: no strip is finished before the others");
+    }
+}

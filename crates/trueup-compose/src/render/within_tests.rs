@@ -56,6 +56,64 @@ fn composed(blend: Blend, memory: usize, disk: &RamDisk, threads: usize) -> Resu
     Ok((rendered, photographs.1.load(Ordering::Relaxed)))
 }
 
+/// Two rows of high photographs, so large that each is drawn `reduced` times smaller than it is.
+fn high_scene(reduced: f64, period: Option<usize>) -> (CanvasLayout, Corrections, Counting) {
+    let size = [260.0, 560.0].map(|length: f64| (length * reduced).round());
+    let placed = (0..COUNT)
+        .map(|i| {
+            let (left, top) = ((i / 2) as f64 * 190.0, (i % 2) as f64 * 440.0);
+            moved(i, size[0], size[1], move |p| {
+                let p = p / reduced;
+                [p.x + left + 0.05 * p.y, 1.01 * p.y + top + 0.04 * p.x + 2e-5 * p.x * p.y]
+            })
+        })
+        .collect();
+    let [width, height] = size.map(|length| length as usize);
+    let photographs = (0..COUNT).map(|i| {
+        let data = noise(width, height, 3).into_data().into_iter().map(|level| level / 4 + 40 + 7 * i as u8).collect();
+        trueup_core::raster::Photograph::Eight(
+            trueup_core::raster::Raster::from_data(width, height, 3, data).expect("as many samples"),
+        )
+    });
+    let corrections: Vec<_> = (0..COUNT).map(|i| Correction::uniform(1.0 + 0.01 * i as f64)).collect();
+    let layout = CanvasLayout { period, ..canvas(1000, 1000, placed) };
+    (layout, corrections.into(), Counting(Memory(photographs.collect()), AtomicUsize::new(0)))
+}
+
+/// Enlarged, interpolated, averaged, and halved and made to fit; on a plane and around a cylinder.
+#[test]
+fn photographs_in_parts_make_the_same_panorama() {
+    for (blend, reduced, period) in [
+        (Blend::MultiBand, 1.0, None),
+        (Blend::MultiBand, 2.6, Some(1000)),
+        (Blend::None, 1.3, None),
+        (Blend::None, 0.4, Some(1000)),
+    ] {
+        let composed = |of: fn(&MemoryNeeds) -> usize, threads: usize| {
+            let (layout, corrections, photographs) = high_scene(reduced, period);
+            let options = RenderOptions { blend, ..RenderOptions::default() };
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(|| {
+                let memory = of(&memory_needs(&layout, &photographs, &options).expect("few photographs"));
+                let disk = RamDisk::default();
+                let resources = Resources { memory, ceiling: memory, scratch: &disk, helpers: None };
+                let input = RenderInput { layout: &layout, corrections: &corrections, photographs: &photographs };
+                let (seams, context) = (SeamOptions::default(), StageContext::default());
+                let rendered = run(&input, &resources, &options, &seams, None, &context).expect("enough");
+                (bits(&rendered.panorama), photographs.1.load(Ordering::Relaxed))
+            })
+        };
+        let (free, decoded) = composed(|_| usize::MAX, 2);
+        // Those that are seen at two places of a cylinder are decoded for each.
+        assert!((COUNT..2 * COUNT).contains(&decoded), "{blend:?} {reduced}");
+        for threads in [1, 3] {
+            let (parts, decoded) = composed(MemoryNeeds::least, threads);
+            assert!(decoded > 2 * COUNT, "{blend:?} {reduced}: {decoded} decoded");
+            assert!(parts == free, "{blend:?} {reduced}, {threads} threads");
+        }
+    }
+}
+
 #[test]
 fn the_budget_does_not_show_in_the_panorama() {
     for blend in [Blend::MultiBand, Blend::None, Blend::Feather, Blend::Average] {

@@ -88,6 +88,20 @@ impl Positions {
         ]
     }
 
+    /// The same in a photograph without so many rows above.
+    pub(crate) fn move_up(&mut self, rows: usize) {
+        if rows > 0 {
+            self.row.iter_mut().for_each(|row| *row = row.wrapping_sub(rows as i32));
+        }
+    }
+
+    /// Undoes [`Self::move_up`].
+    pub(crate) fn move_down(&mut self, rows: usize) {
+        if rows > 0 {
+            self.row.iter_mut().for_each(|row| *row = row.wrapping_add(rows as i32));
+        }
+    }
+
     /// Makes room for `length` positions.
     pub(crate) fn resize(&mut self, length: usize) {
         self.column.resize(length, 0);

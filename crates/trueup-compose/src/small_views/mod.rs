@@ -144,7 +144,7 @@ impl MadeSmall {
 /// photographs and a scratch file return.
 pub(crate) fn run(input: &SmallViewsInput<'_>, context: &StageContext) -> Result<SmallViews> {
     let mut all = SmallViews::none(input);
-    let mut room = input.plan.photographs;
+    let mut room = input.plan.kept;
     let positions: Vec<usize> = (0..input.unrolled.original_layout().placed.len()).collect();
     make_each(input, &positions, context, |_, made, photograph| {
         let bytes = made.bytes;
