@@ -17,8 +17,8 @@ use crate::window::{Window, common};
 /// Canvas pixels across a strip: enough tiles for all threads, few enough photographs.
 const STRIP: usize = 512;
 
-/// The same where photographs are held in parts: the thicker strips are, the fewer want a photograph, and the more of it
-/// each.
+/// The same where photographs are held in parts: the thicker strips are, the fewer want a photograph, and the more of
+/// it each.
 const PARTS_STRIPS: [usize; 4] = [512, 1024, 2048, 4096];
 
 /// Tiles that are finished one after the other, and the photographs they are made of.
@@ -132,7 +132,8 @@ pub(super) fn regions(unrolled: &Unrolled<'_>, first_level: u32, parts: &[Rectan
     places.map(|(top, left)| within(top, left)).filter(|parts| !parts.is_empty()).collect()
 }
 
-/// Indices of the tiles of every strip, so many tiles `thick`; within a strip, those that lie side by side across it follow each other.
+/// Indices of the tiles of every strip, so many tiles `thick`; within a strip, those that lie side by side across it
+/// follow each other.
 fn strips(along: usize, across: usize, thick: usize, index: impl Fn(usize, usize) -> usize) -> Vec<Vec<usize>> {
     let thick = thick.max(1);
     (0..along)

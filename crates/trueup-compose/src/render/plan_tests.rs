@@ -65,7 +65,7 @@ fn photographs_are_in_parts_where_whole_ones_have_no_room() {
         assert!(!free.in_parts && free.kept == free.photographs);
         let whole = needs().least_whole();
         let least = needs().least();
-        // Of six photographs of 48 MB that are counted, two stay, to decode one; rows of those that meet at a tile come.
+        // Of six photographs of 48 MB that are counted, two stay, to decode one; rows of those that meet come.
         assert!(least + 3 * 48_000_000 < whole, "{blend:?}: {least} of {whole}");
         assert!(!plan(whole, whole, blend).expect("whole ones fit").in_parts);
         for memory in [least, whole - 1] {
